@@ -55,7 +55,7 @@ class LightmapReceiver:
         self._layers = dict(zip([obj.name for obj in self._objects], layers, strict=True))
         for obj, layer in zip(self._objects, layers, strict=True):
             obj.data.uv_layers.active = obj.data.uv_layers[layer]  # the one that a bake goes by
-        self._spread = True  # of light: over a texel's footprint
+        self._spread = True  # samples are jittered over the texel's footprint; False: the first is at its center
         self._small: dict[tuple[int, int], bpy.types.Image] = {}  # images of shares, by size
         self._whole_uvs: dict[str, np.ndarray] = {}  # (N, 2) by object, once a share is rendered
         self._owner = np.zeros(

@@ -25,12 +25,7 @@ from srbf.lights import (
 
 KINDS: dict[str, Any] = {"directional": DirectionalLight, "point": PointLight, "spot": SpotLight, "sphere": SphereLight, "area": AreaLight}
 OF_PROFILES = ("direction", "roll", "profile")
-UNSAID: dict[str, Any] = {
-    "angle": None,
-    "size": 0.0,
-    "receivers": None,
-    "blockers": None,
-}  # what an entry leaves out where it has this value
+UNSAID: dict[str, Any] = {"angle": None, "size": 0.0, **dict.fromkeys(LINKS)}  # what an entry leaves out where it has this value
 Profiles = Callable[[str], Profile]
 
 

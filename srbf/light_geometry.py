@@ -88,29 +88,31 @@ def soft_cone(light: SpotLight, away: Float[ndarray, "n 3"], normals: Float[ndar
     >>> float(soft_cone(spot, 2 * np.array([[np.sin(0.5), 0, -np.cos(0.5)]]))[0].round(1))  # half of the sphere is past the edge
     0.5
     """
-    edges = np.cos(light.inner), np.cos(light.outer)
+    edges, direction = (np.cos(light.inner), np.cos(light.outer)), np.array(light.direction)
     distance = np.linalg.norm(away, axis=1)
     axis = away / np.maximum(distance, 1e-30)[:, None]
-    if light.size == 0:
-        return spot_cone(axis @ np.array(light.direction), *edges)
+    found = spot_cone(axis @ direction, *edges)
+    sine = np.minimum(light.size / np.maximum(distance, 1e-30), 1)
+    off, reach = np.arccos(np.clip(axis @ direction, -1, 1)), np.arcsin(sine)
+    crossed = np.flatnonzero((off + reach > light.inner) & (off - reach < light.outer) & (sine > 0))
+    if not len(crossed):
+        return found
+    axis, lowest = axis[crossed], np.sqrt(1 - sine[crossed] ** 2)
     across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-30)
-    up = np.cross(axis, across)
-    lowest = np.sqrt(1 - np.minimum(light.size / np.maximum(distance, 1e-30), 1) ** 2)
-    cone, facing = (
-        None if other is None else [np.einsum("nk,nk->n", vector, other) for vector in (axis, across, up)]
-        for other in (np.broadcast_to(np.array(light.direction), axis.shape), normals)
-    )
-    assert cone is not None
-    total, whole = np.zeros(len(axis)), np.zeros(len(axis))
+    frame = np.stack([axis, across, np.cross(axis, across)], axis=1)
+    along = frame @ direction
+    facing = None if normals is None else -np.einsum("nfk,nk->nf", frame, normals[crossed])
+    total, whole = np.zeros((2, len(axis)))
     for i in range(CONE_POINTS):
         cosine = 1 - (i + 0.5) / CONE_POINTS * (1 - lowest)
-        sine, turn = np.sqrt(np.maximum(1 - cosine**2, 0)), 2 * np.pi * GOLDEN * i
-        part = (cosine, sine * np.cos(turn), sine * np.sin(turn))
-        weight = 1.0 if facing is None else np.maximum(-sum(a * b for a, b in zip(part, facing, strict=True)), 0)
-        total += weight * spot_cone(np.asarray(sum(a * b for a, b in zip(part, cone, strict=True))), *edges)
+        radius, turn = np.sqrt(np.maximum(1 - cosine**2, 0)), 2 * np.pi * GOLDEN * i
+        part = np.stack([cosine, radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+        weight = np.ones(len(axis)) if facing is None else np.maximum(np.einsum("nf,nf->n", part, facing), 0)
+        total += weight * spot_cone(np.einsum("nf,nf->n", part, along), *edges)
         whole += weight
-    return total / np.maximum(whole, 1e-30)
+    found[crossed] = total / np.maximum(whole, 1e-30)
+    return found
 
 
 def light_vectors(light: PointLight, positions: Float[ndarray, "*p 3"]) -> tuple[Float64[ndarray, "*p 3"], Float64[ndarray, "*p"]]:

@@ -109,7 +109,7 @@ class LightImages(ReceiverImages):
         light = self.lights[index]
         if light.share is None:
             return self._read(light.file, 3)
-        return self._interpolated(light.share, light.file).reshape(self.height, self.width, 3)
+        return self._rows_of(index, light.file, None).astype(np.float32, copy=False).reshape(self.height, self.width, 3)
 
     def partial_image(self, index: int) -> tuple[Float32[ndarray, "H W 3"], Bool[ndarray, "H W"]]:
         """The responses to one light, and the region that its image holds. Values outside the region are not looked at: they may be NaN.
@@ -331,14 +331,17 @@ class LightImages(ReceiverImages):
         share = self.lights[index].share
         if share is None:
             return self._read_rows(file, rows)
-        whole = self._interpolated(share, file)
-        return whole if rows is None else np.concatenate([whole[begin * self.width : end * self.width] for begin, end in rows])
+        image, operator = self._shared(share, file), self.operators.of(self, share)
+        if rows is None:
+            return operator @ image
+        return np.concatenate([operator[begin * self.width : end * self.width] @ image for begin, end in rows])
 
-    def _interpolated(self, share: Share, file: str) -> Float32[ndarray, "P 3"]:
+    def _shared(self, share: Share, file: str) -> Float32[ndarray, "K 3"]:
+        """The texels that the image of a share has."""
         path = self.folder / file
         image = read_image(path, 3)
         width, height = share.size(self.width, self.height)
         if image.shape[:2] != (height, width):
             raise ImageError(f"expected {width}x{height} texels of a share in {path}, found {image.shape[1]}x{image.shape[0]}")
         require_finite(image, path)
-        return self.operators.of(self, share) @ image.reshape(-1, 3)
+        return image.reshape(-1, 3)

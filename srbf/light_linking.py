@@ -45,6 +45,10 @@ class Objects:
     without: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        for field, names in (("only", self.only), ("without", self.without)):
+            if isinstance(names, str):
+                raise InputError(f"expected names of objects in `{field}`, found {names!r}; put it into a list")
+            object.__setattr__(self, field, None if names is None else tuple(names))
         for name in self.named:
             if not isinstance(name, str) or not name:
                 raise InputError(f"expected names of objects, found {name!r}")

@@ -60,7 +60,7 @@ class DirectionalLight:
         object.__setattr__(self, "direction", _unit(self.direction))
         object.__setattr__(self, "color", triple(self.color, "color"))
         if self.angle is not None:
-            object.__setattr__(self, "angle", _not_negative(self.angle, "a sun's angle"))
+            object.__setattr__(self, "angle", _above_zero(self.angle, "a sun's angle", or_zero=True))
             if self.angle > np.pi:
                 raise InputError(f"expected a sun's angle of at most pi rad, found {self.angle:g}")
 
@@ -196,7 +196,7 @@ class SpotLight(PointLight):
     size: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "size", _not_negative(self.size, "a spot's size"))
+        object.__setattr__(self, "size", _above_zero(self.size, "a spot's size", or_zero=True))
         inner, outer = float(self.inner), float(self.outer)
         if not 0 <= inner <= outer <= np.pi:
             raise InputError(f"expected spot half-angles 0 <= inner <= outer <= pi rad, found inner {inner:g}, outer {outer:g}")
@@ -381,6 +381,11 @@ def radius_of(light: object) -> float:
     return light.size if isinstance(light, (SphereLight, SpotLight)) else 0.0
 
 
+def has_size(light: object) -> bool:
+    """Whether a light inside the scene has soft shadows."""
+    return isinstance(light, AreaLight) or radius_of(light) > 0
+
+
 Light = DirectionalLight | PointLight | SpotLight | SphereLight | AreaLight | EnvironmentLight | NamedLight
 """A light of any kind, as `relight` takes them."""
 
@@ -462,23 +467,14 @@ def triple(value: object, name: str = "a vector") -> Triple:
     return (float(array[0]), float(array[1]), float(array[2]))
 
 
-def _above_zero(value: object, name: str) -> float:
+def _above_zero(value: Any, name: str, or_zero: bool = False) -> float:
+    expected = f"expected {name} of at least 0" if or_zero else f"expected {name} above 0"
     try:
-        number = float(value)  # type: ignore[arg-type]
+        number = float(value)
     except (TypeError, ValueError) as error:
-        raise InputError(f"expected {name} above 0, found {value!r}") from error
-    if not (np.isfinite(number) and number > 0):
-        raise InputError(f"expected {name} above 0, found {number:g}")
-    return number
-
-
-def _not_negative(value: object, name: str) -> float:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError) as error:
-        raise InputError(f"expected {name} of at least 0, found {value!r}") from error
-    if not (np.isfinite(number) and number >= 0):
-        raise InputError(f"expected {name} of at least 0, found {number:g}")
+        raise InputError(f"{expected}, found {value!r}") from error
+    if not np.isfinite(number) or number < 0 or (number == 0 and not or_zero):
+        raise InputError(f"{expected}, found {number:g}")
     return number
 
 

@@ -1,4 +1,4 @@
-"""Texels that an image lacks, from its nearest known ones: those close in the image, in the scene, and in the direction of the surface."""
+"""Missing texels of an image, interpolated from the nearest known ones: near in the image, the scene, and the direction of the normal."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def interpolation(
 ) -> Any:
     """The linear map from the texels that are `known` to all texels of an image.
 
-    A texel p takes Σ_q w_q x_q / Σ_q w_q of the 4 nearest known covered texels q, w_q = exp(−(d_q² − d_min²) / (2 · 0.7²)). The distance d
+    The value at texel p is Σ_q w_q x_q / Σ_q w_q over the 4 nearest known covered texels q, w_q = exp(−(d_q² − d_min²) / (2 · 0.7²)). d
     is Euclidean over place in the image, position and normal, in units of the mean spacing of known texels; a known texel keeps its
     value. So light does not leak between charts, or around edges. What is not covered takes the nearest covered texel of the image.
 
@@ -38,11 +38,11 @@ def interpolation(
     Returns
     -------
     scipy.sparse.csr_matrix
-        (P, K) float32 on the K known texels in their order, row by row; each row adds up to 1. 32 bytes per texel.
+        (P, K) float32 on the K known texels in their order, row by row; each row adds up to 1. 36 bytes per texel.
 
     Notes
     -----
-    A k-d tree search per texel: about 8 s for a million texels.
+    One k-d tree search per texel: about 8 s for a million texels.
     """
     from scipy import ndimage
     from scipy.sparse import csr_matrix

@@ -14,7 +14,7 @@ from srbf.capture import Capture
 from srbf.channels import THROUGH
 from srbf.io import files
 from srbf.io.image import write_image
-from srbf.methods.deep_framebuffer import GLOSSY_FILES
+from srbf.methods.deep_framebuffer import GLOSSY_FILES, POINTS
 from srbf.methods.mixed_clusters import BEHIND
 
 
@@ -35,6 +35,12 @@ def surfaces_of(room: Room, longest: float, bounces: int = 12) -> FoundSurfaces:
         np.array(bounces),
         names='["Gray", "Red"]',
     )
+
+
+def without_near(asset: Asset) -> Asset:
+    """The asset, whose light comes by links alone."""
+    tables = {name: table for name, table in asset.tables.items() if name != POINTS}
+    return replace(asset, tables=tables | {"view_links": asset.tables["view_links"].copy()})  # what is made ready goes by this table
 
 
 def view_of_room(

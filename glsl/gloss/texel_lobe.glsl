@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* srbfTexelLobe: srbfSpecularLobe of a texel by its images, 0 where it has no lobe.
+/* srbfTexelLobe: srbfSpecularLobe with the albedo and roughness stored per texel; 0 where the texel has no lobe.
    use:    vec3 srbfTexelLobe(sampler2D glossy, sampler2D lobes, sampler2D lobeAlbedo, ivec2 texel, vec3 point, vec3 normal, vec4 eye,
                               vec3 toLight, float spread)
    domain: glossy: whole albedo; lobes: roughness, share with a Fresnel term, above 0 where there is a lobe; eye: a place, m, in the frame

@@ -6,7 +6,7 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 
-#include "surfels/disc_factor.glsl"
+#include "surfels/near_light.glsl"
 
 uniform sampler2D receivers;  // place, meters
 uniform sampler2D normals;
@@ -20,15 +20,5 @@ layout(location = 0) out vec4 irradiance;
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     vec3 place = texelFetch(receivers, at, 0).xyz;
-    vec3 normal = texelFetch(normals, at, 0).xyz;
-    vec3 total = vec3(0.0);
-    for (int i = 0; i < count; ++i) {
-        vec4 source = texelFetch(sources, ivec2(i, 0), 0);
-        vec4 facing = texelFetch(sources, ivec2(i, 1), 0);
-        float visible = texelFetch(seen, at + ivec2(0, rows * int(facing.w)), 0).r;
-        if (visible > 0.0) {
-            total += visible * srbfDiscFactor(source.xyz - place, normal, facing.xyz, source.w) * texelFetch(sources, ivec2(i, 2), 0).rgb;
-        }
-    }
-    irradiance = vec4(total, 1.0);
+    irradiance = vec4(srbfNearLight(sources, count, seen, rows, at, place, texelFetch(normals, at, 0).xyz), 1.0);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
 // How much receivers see of a place on a surface, 0 to 1, of those that are seen through one face of a cube about it; others keep what they
-// have. For each cell of bright surfels once: nothing of it follows a light.
+// have. For each cell of bright surfels once: the result does not depend on any light.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -36,7 +36,7 @@ uniform bool profiled;    // whether the light has a profile
 uniform vec3 profileAcross;
 uniform vec3 profileUp;
 uniform float profileTangent;
-uniform vec4 ball;        // middle of a sphere, less the origin of the points, and its radius; radius 0 otherwise
+uniform vec4 sphere;        // middle of a sphere, less the origin of the points, and its radius; radius 0 otherwise
 #ifdef SRBF_LOBES
 uniform sampler2D glossy;      // whole albedo of each texel's lobe
 uniform sampler2D lobes;       // its roughness, what share of it has a Fresnel term, above 0 where there is one
@@ -44,8 +44,8 @@ uniform sampler2D lobeAlbedo;  // as srbfLobeAlbedo takes it
 uniform vec4 eye;              // a place, less the same origin as the points, and 1; or the unit direction to it, and 0
 uniform vec3 partAcross;       // sides of the part of an area that the look stands for, meters; 0 otherwise
 uniform vec3 partUp;
-uniform int ballPart;          // which of ballParts
-uniform int ballParts;
+uniform int sphereLook;          // which of sphereLooks
+uniform int sphereLooks;
 #endif
 
 layout(location = 0) out vec4 response;
@@ -65,13 +65,13 @@ vec3 reflected(ivec2 at, vec3 point, vec3 normal, vec3 lightVector) {
     int count = 1;
     float size = 0.0;  // of the piece of light about a place, meters across
     vec3 middle = lightVector;
-    vec3 discAcross;  // of a ball's disc, as the receiver sees it
+    vec3 discAcross;  // of a sphere's disc, as the receiver sees it
     vec3 discUp;
-    srbfTangents(srbfLightDirection(ball.xyz - point), discAcross, discUp);
-    if (ball.w > 0.0) {
+    srbfTangents(srbfLightDirection(sphere.xyz - point), discAcross, discUp);
+    if (sphere.w > 0.0) {
         count = side * side / 2;
-        size = ball.w * sqrt(3.14159265 / float(count * ballParts));
-        middle = ball.xyz - point;
+        size = sphere.w * sqrt(3.14159265 / float(count * sphereLooks));
+        middle = sphere.xyz - point;
     } else if (partAcross != vec3(0.0)) {
         count = side * side;
         size = sqrt(length(partAcross) * length(partUp)) / float(side);
@@ -79,16 +79,16 @@ vec3 reflected(ivec2 at, vec3 point, vec3 normal, vec3 lightVector) {
     vec3 total = vec3(0.0);
     for (int i = 0; i < count; ++i) {
         vec3 toPlace = middle;
-        if (ball.w > 0.0) {
-            float number = float(i * ballParts + ballPart) + 0.5;
-            float away = ball.w * sqrt(number / float(count * ballParts));
+        if (sphere.w > 0.0) {
+            float number = float(i * sphereLooks + sphereLook) + 0.5;
+            float away = sphere.w * sqrt(number / float(count * sphereLooks));
             toPlace += away * (cos(GOLDEN_ANGLE * number) * discAcross + sin(GOLDEN_ANGLE * number) * discUp);
         } else if (count > 1) {
             vec2 part = (vec2(float(i % side), float(i / side)) + 0.5) / float(side) - 0.5;
             toPlace += part.x * partAcross + part.y * partUp;
         }
         vec3 toLight = srbfLightDirection(toPlace);
-        float strength = srbfPointLightStrength(pointLight, ball.w > 0.0 ? middle : toPlace) * mix(1.0, max(dot(-toLight, pointLight.axis), 0.0), lambertian);
+        float strength = srbfPointLightStrength(pointLight, sphere.w > 0.0 ? middle : toPlace) * mix(1.0, max(dot(-toLight, pointLight.axis), 0.0), lambertian);
         total += srbfTexelLobe(glossy, lobes, lobeAlbedo, at, point, normal, eye, toLight, 0.5 * size / max(length(toPlace), 1e-6)) * strength;
     }
     return total / float(count);
@@ -112,11 +112,11 @@ void main() {
     float NoL = max(dot(normal, toLight), 1.0 / STEEPEST);
     vec2 slope = -vec2(dot(normal, across), dot(normal, up)) / (NoL * max(length(lightVector), 1e-20)) * step;
     float bias = BIAS * step * place.z;
-    vec3 visibility = vec3(seen ? srbfShadowFraction(heights, place.xy, place.z, slope, bias) : 0.0);
+    vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
     visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
     if (profiled) {
-        visibility *= srbfProfile(profile, ball.w > 0.0 ? point - ball.xyz : fromLight, pointLight.axis, profileAcross, profileUp, profileTangent);
+        visibility *= srbfProfile(profile, sphere.w > 0.0 ? point - sphere.xyz : fromLight, pointLight.axis, profileAcross, profileUp, profileTangent);
     }
     response = vec4(srbfDirect(normal, toLight, visibility) * strength * weight, 1.0);
 #ifdef SRBF_LOBES

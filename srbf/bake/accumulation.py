@@ -14,7 +14,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32
-from srbf.bake.settings import PlannedLight
+from srbf.bake.planned_lights import PlannedLight
 from srbf.errors import ImageError
 from srbf.io import files
 

@@ -16,10 +16,11 @@ from srbf.bake.checks import bytes_needed
 from srbf.bake.cubemap_set import CubemapSet, seconds_of_rays
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.job import base_job
+from srbf.bake.planned_lights import PlannedLight
 from srbf.bake.request import RenderRequest
 from srbf.bake.run import Bake
 from srbf.bake.schedule import next_samples
-from srbf.bake.settings import PlannedLight, plan_lights
+from srbf.bake.settings import plan_lights
 from srbf.bake.worker import Worker
 from srbf.compute.threads import cores
 from srbf.cubemap import Cubemap

@@ -88,7 +88,7 @@ class FoundSurfaces:
     def of_arrays(stored: Mapping[str, ndarray]) -> FoundSurfaces:
         """From `arrays`."""
         known: dict[str, Any] = {entry.name: stored[entry.name] for entry in fields(FoundSurfaces) if entry.name in stored}
-        texts = {"lights": str(known.get("lights", NO_LIGHTS)), "names": str(known.get("names", NO_NAMES))}
+        texts = {"lights": str(known.get("lights", NO_LIGHTS)), "names": str(known["names"])}
         return FoundSurfaces(**(known | texts))
 
     @property

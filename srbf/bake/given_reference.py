@@ -16,9 +16,10 @@ from numpy import ndarray
 from srbf.arrays import Float32
 from srbf.asset import Asset
 from srbf.bake.job import base_job
+from srbf.bake.planned_lights import Rendered, noise_seed
 from srbf.bake.request import RenderRequest
 from srbf.bake.run import require_scene
-from srbf.bake.settings import BakeSettings, Receiver, Rendered, noise_seed
+from srbf.bake.settings import BakeSettings, Receiver
 from srbf.bake.worker import Worker
 from srbf.errors import BakeError, InputError
 from srbf.io import files

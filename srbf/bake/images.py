@@ -13,7 +13,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Int
 from srbf.bake.accumulation import ACCUMULATION, load_array, save_array
-from srbf.bake.settings import PlannedLight
+from srbf.bake.planned_lights import PlannedLight
 from srbf.bake.viewers import project, viewer_directions
 from srbf.channels import CHANNELS, GEOMETRY, file_name
 from srbf.encode.dilation import dilate, nearest_covered

@@ -8,9 +8,10 @@ from typing import Any
 
 from srbf.bake.images import ASKED_FOR
 from srbf.bake.light_sets import LIGHT_SET_FILE, NamedSet, PlacedLight
+from srbf.bake.planned_lights import noise_seed
 from srbf.bake.probes import PROBES_FILE, write_job
 from srbf.bake.request import RenderRequest
-from srbf.bake.settings import BakeSettings, noise_seed, plan_lights
+from srbf.bake.settings import BakeSettings, plan_lights
 from srbf.bake.viewers import viewer_directions
 from srbf.channels import GLOSS, THROUGH
 from srbf.sphere import point_set

@@ -17,10 +17,11 @@ from srbf.bake.folder import STATE
 from srbf.bake.images import MASKS
 from srbf.bake.job import base_job
 from srbf.bake.light_sets import PlacedLight
+from srbf.bake.planned_lights import PlannedLight, noise_seed
 from srbf.bake.request import RenderRequest
 from srbf.bake.run import Bake
 from srbf.bake.schedule import FIRST_SAMPLES
-from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed
+from srbf.bake.settings import BakeSettings
 from srbf.bake.worker import Worker
 from srbf.encode.light_function_fit import choose_functions, dense_centers
 from srbf.encode.model_selection import TexelSample

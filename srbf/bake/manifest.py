@@ -8,7 +8,8 @@ from typing import Any
 import srbf
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.images import SCENE_FILE, SEAMS
-from srbf.bake.settings import BakeSettings, PlannedLight
+from srbf.bake.planned_lights import PlannedLight
+from srbf.bake.settings import BakeSettings
 from srbf.channels import file_name, manifest_keys
 
 

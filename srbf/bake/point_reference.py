@@ -15,8 +15,9 @@ from srbf.arrays import Float64
 from srbf.asset import Asset
 from srbf.bake.job import AMBIENT_SEED, base_job
 from srbf.bake.light_sets import PlacedLight
+from srbf.bake.planned_lights import PlannedLight, noise_seed
 from srbf.bake.request import RenderRequest
-from srbf.bake.settings import BakeSettings, PlannedLight, Receiver, noise_seed
+from srbf.bake.settings import BakeSettings, Receiver
 from srbf.bake.worker import Worker
 from srbf.errors import InputError
 from srbf.io import files

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from srbf.bake.settings import PlannedLight, Rendered
+from srbf.bake.planned_lights import PlannedLight, Rendered
 from srbf.receiver_share import Share
 
 

@@ -24,8 +24,9 @@ from srbf.bake.light_pass import add_pass
 from srbf.bake.light_set_files import trace_operator, write_light_set, write_probes
 from srbf.bake.light_sets import NamedSet
 from srbf.bake.manifest import capture_manifest
+from srbf.bake.planned_lights import PlannedLight, noise_seed
 from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
-from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
+from srbf.bake.settings import BakeSettings, plan_lights
 from srbf.bake.shard import Shard
 from srbf.bake.worker import Worker
 from srbf.bake.worker_pool import RemoteResult, Renderer, Response, Task, WorkerPool, WorkerPoolSettings

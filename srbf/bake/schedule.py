@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from srbf.bake.settings import PlannedLight
+from srbf.bake.planned_lights import PlannedLight
 from srbf.sphere import farthest_points
 
 FIRST_SAMPLES = 2  # of a light's first pass: a pass has a fixed cost of about half a sample

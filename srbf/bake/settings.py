@@ -14,9 +14,10 @@ import numpy as np
 from srbf.bake.cubemap_set import CubemapSet
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import CloudSet, NamedSet, PlacedLight
+from srbf.bake.planned_lights import PlannedLight, Rendered, noise_seed
 from srbf.bake.point_lights import PointGrid
 from srbf.basis.exitant_harmonics import MAX_ORDER
-from srbf.captured_light import ROLES, LightKind, Role
+from srbf.captured_light import ROLES, Role
 from srbf.errors import InputError
 from srbf.importing.light_list import read_light_list
 from srbf.probe_grid import ProbeGrid
@@ -25,7 +26,6 @@ from srbf.receiver_share import MOST_STEPS, Share, share_word, shares_in_turn
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
 
 Kind = Literal["lightmap", "vertices", "view", "probes"]
-Rendered = Literal["response", "direct", "indirect", "denoised", "toward"]  # images of a light that a worker renders
 Unwrap = Literal["smart", "lightmap-pack", "keep"]
 LARGEST_SIDE = 16384
 LightSet = NamedSet | CloudSet | GatherSet | CubemapSet
@@ -417,58 +417,6 @@ class BakeSettings:
         return record
 
 
-@dataclass(frozen=True)
-class PlannedLight:
-    """A light to bake: index in the capture, what and where it is, role, samples per texel, seed of its noise.
-
-    `parts`: which images the worker renders of it, the one that the capture keeps first; `direct` is kept in a file of its own.
-    `share`: the texels that its images have; None: all.
-    """
-
-    index: int
-    placed: PlacedLight
-    role: Role
-    samples: int
-    seed: int
-    parts: tuple[Rendered, ...] = ("response",)
-    gloss: int | None = None
-    share: Share | None = None
-
-    @property
-    def place(self) -> tuple[float, float, float]:
-        """Unit direction or position (m), by which lights are spread over the time of a bake; 0 of named lights."""
-        return self.placed.place
-
-    @property
-    def kind(self) -> LightKind:
-        return self.placed.kind
-
-    @property
-    def part(self) -> float:
-        """Of the texels, about, that its images have."""
-        return 1.0 if self.share is None else 1 / self.share.step**2
-
-    @property
-    def has_direct(self) -> bool:
-        """Whether its direct light is kept apart."""
-        return "direct" in self.parts
-
-    @property
-    def file(self) -> str:
-        return f"lights/{self.index:04d}.exr"
-
-    @property
-    def direct_file(self) -> str:
-        """The direct light that an indirect capture's image lacks."""
-        return f"direct/{self.index:04d}.exr"
-
-    @property
-    def harmonics_files(self) -> tuple[str, ...]:
-        """The images of its radiance's harmonics; none where it is captured toward one viewer."""
-        count = 0 if self.gloss is None else (self.gloss + 1) ** 2
-        return tuple(f"harmonics/{self.index:04d}_{k:02d}.exr" for k in range(count))
-
-
 def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
     """Train lights (Hammersley, the light list's, a grid of point lights, or those of a set), then validation and holdout: random ones."""
     apart = settings.transport == "indirect"
@@ -509,9 +457,3 @@ def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
             seed = noise_seed(settings.seed, index)
             planned.append(PlannedLight(index, light, role, samples, seed, parts[role], settings.gloss, share))
     return planned
-
-
-def noise_seed(seed: int, light: int, sampling_pass: int = 0) -> int:
-    """Cycles' seed for one image: a hash, so that no two lights share their noise and a fit can average it."""
-    digest = hashlib.blake2b(f"{seed}:{light}:{sampling_pass}".encode(), digest_size=4).digest()
-    return int.from_bytes(digest, "big") & 0x7FFFFFFF

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from srbf.bake.settings import PlannedLight
+from srbf.bake.planned_lights import PlannedLight
 from srbf.errors import InputError
 
 

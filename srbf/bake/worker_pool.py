@@ -15,8 +15,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy import ndarray
 
+from srbf.bake.planned_lights import PlannedLight
 from srbf.bake.request import RenderRequest
-from srbf.bake.settings import PlannedLight
 from srbf.bake.worker import Worker, WorkerDiedError
 from srbf.errors import BakeError
 from srbf.io import files

@@ -289,7 +289,7 @@ ShareOf = Annotated[
         "--share",
         metavar="FRACTION",
         parser=Parsed(share_step),
-        help="1/4, 1/9 or 1/16 of the texels for each fitted light, others for the next: as much from more directions. Default whole.",
+        help="Share of the texels that each fitted light renders: 1/4, 1/9 … 1/64; the next light renders others. Default whole.",
         show_default=False,
         rich_help_panel=QUALITY,
     ),

@@ -14,6 +14,7 @@ from srbf.asset import Asset
 from srbf.bake.given_reference import changed_line, render_given
 from srbf.cli.terminal import note, progress_bar
 from srbf.errors import MissingLibraryError
+from srbf.evaluation.errors_by_role import psnr
 from srbf.evaluation.flip import Flip
 from srbf.io.image import write_image
 from srbf.light_entries import entry_with_file
@@ -46,11 +47,11 @@ def compare(
     covered = asset.covered
     relit, reference = image[covered].astype(np.float64), made.image[covered].astype(np.float64)
     mean, power = ((relit - reference) ** 2).mean(), max((reference**2).mean(), 1e-30)
-    psnr = 10 * np.log10(np.quantile(reference, PEAK) ** 2 / max(mean, 1e-30))
+    ratio = psnr(float(np.quantile(reference, PEAK)), float(np.sqrt(mean)))
     try:
         flip = f", FLIP {Flip(exposure).error_map(made.image, image, covered)[covered].mean():.4f}"
     except MissingLibraryError:
         flip = ""
     write_image(path_beside(output), made.image, "float")
     note(f"wrote {path_beside(output)}: {samples} samples in {made.render_seconds:.1f} s, {made.seconds:.1f} s with opening the scene")
-    note(f"relative rmse {np.sqrt(mean / power):.2%}, psnr {psnr:.2f} dB{flip}")
+    note(f"relative rmse {np.sqrt(mean / power):.2%}, psnr {ratio:.2f} dB{flip}")

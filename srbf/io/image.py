@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -258,6 +259,14 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding, noisy: bool = F
         written = target.write_image(np.ascontiguousarray(stored))
         if not (target.close() and written):
             raise ImageError(f"cannot write image {path}: {_first_line(target.geterror())}; is the disk full?")
+
+
+def float_exr(pixels: ndarray) -> bytes:
+    """(H, W, C) as the bytes of an EXR of 32-bit floats."""
+    with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
+        path = Path(folder) / "image.exr"
+        write_image(path, pixels, "float")
+        return path.read_bytes()
 
 
 def write_images(images: Sequence[tuple[Path, ndarray, Encoding, bool]]) -> None:

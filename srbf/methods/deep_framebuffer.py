@@ -16,7 +16,7 @@ from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.channels import GLOSS, THROUGH
 from srbf.encode.dilation import nearest_covered
-from srbf.errors import ImageError, InputError
+from srbf.errors import ImageError, InputError, ManifestError
 from srbf.light_domain import domain_of_capture
 from srbf.lights import WHITE, Light, PointLight, refuse_named
 from srbf.methods.carried import carried_images, common_manifest, required_scene
@@ -220,6 +220,10 @@ class DeepFramebuffer(Method):
                     raise ImageError(f"expected {COLUMNS} columns of {name}_{part} in {reader.folder}, found {pixels.shape[1]}; fit again")
                 tables[f"{name}_{part}"] = np.round(pixels * 255).astype(np.uint8)
         if POINTS in reader.manifest:
+            if not {"near_labels", "near_places"} <= reader.manifest.keys():
+                raise ManifestError(
+                    f"expected near_labels beside {POINTS} in {reader.folder}, found an asset of an older version; fit again"
+                )
             tables[POINTS] = reader.table(POINTS, (2, told["clusters"]), 3)
             tables["near_labels"] = reader.table("near_labels", (told["near_levels"], told["surfels"]), 1)
             tables["near_places"] = reader.table("near_places", (1, told["near_cells"] + 1), 3)

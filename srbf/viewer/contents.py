@@ -80,7 +80,7 @@ def contents_of(
             errors = f"{CAPTURE}errors-{i}.json"
             contents[errors] = partial(measures.errors, i)
         profiles = {}
-        for number, (profile, made) in enumerate(light_tables.profiles_of(asset).items()):
+        for number, (profile, made) in enumerate(light_tables.profile_files(asset).items()):
             profiles[profile] = f"profile-{i}-{number}.exr"
             contents[profiles[profile]] = made
         own = page_manifest.described(asset, name, place, f"spectrum-{i}.json", errors)

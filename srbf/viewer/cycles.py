@@ -12,7 +12,7 @@ from typing import Any
 from srbf.asset import Asset
 from srbf.bake.given_reference import GivenReference, StoppedError, changed_line, render_given, require_view
 from srbf.errors import InputError, SrbfError
-from srbf.io.image import write_image
+from srbf.io.image import float_exr
 from srbf.light_entries import entry_with_file, lights_of
 from srbf.lights import Light
 from srbf.relighting.scene_lights import profiles_of
@@ -82,10 +82,7 @@ class CyclesRenders:
         """The last finished render as an EXR, (H, W, 3) float; InputError before there is one."""
         if self._image is None:
             raise InputError("expected a finished render by Cycles, found none yet")
-        with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
-            path = Path(folder) / "image.exr"
-            write_image(path, self._image.image, "float")
-            return path.read_bytes()
+        return float_exr(self._image.image)
 
     def _render(self, number: int, lights: list[Light], samples: int, halt: threading.Event) -> None:
         def progress(done: int, total: int) -> None:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass, field
-from pathlib import Path
 from threading import Lock
 from typing import Any
 
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
-from srbf.io.image import write_image
+from srbf.io.image import float_exr
 from srbf.light_domain import domain_of_asset, domain_of_capture
 
 CACHED_IMAGES = 32
@@ -61,10 +59,7 @@ class References:
             raise IndexError(index)
         with self._lock:
             if index not in self._made:
-                with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
-                    path = Path(folder) / "image.exr"
-                    write_image(path, self.capture.image(index), "float")
-                    self._made[index] = path.read_bytes()
+                self._made[index] = float_exr(self.capture.image(index))
                 while len(self._made) > CACHED_IMAGES:
                     self._made.pop(next(iter(self._made)))
             return self._made[index]

@@ -56,10 +56,7 @@ class CloudLights:
 
     def visible(self, origins: Float64[ndarray, "n 3"], targets: Float64[ndarray, "n 3"]) -> ndarray:
         """(n,) whether nothing stands between two places."""
-        vector = np.asarray(targets, np.float64) - origins
-        distance = np.linalg.norm(vector, axis=1)
-        direction = vector / np.maximum(distance, 1e-30)[:, None]
-        return ~self.occluders.occluded(np.asarray(origins, np.float32), direction, distance)
+        return ~self.occluders.between(origins, targets)
 
     def on_patches(self, light: Light) -> Float64[ndarray, "K 3"]:
         """Mean irradiance on every patch."""

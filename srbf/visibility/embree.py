@@ -39,6 +39,13 @@ class EmbreeTriangles:
         hits = self._scene.run(_f(origin), _f(direction), far, query="OCCLUDED")
         return np.asarray(hits) >= 0
 
+    def between(self, starts: np.ndarray, ends: np.ndarray) -> Bool[ndarray, " n"]:
+        """Whether a triangle stands between each start and its end, (n, 3) or one of them (3,), m."""
+        toward = ends - starts
+        distance = np.linalg.norm(toward, axis=-1)
+        origin = np.broadcast_to(starts, toward.shape)
+        return self.occluded(origin, toward / np.maximum(distance, 1e-30)[:, None], distance)
+
     def first_hit(
         self, origin: np.ndarray, direction: np.ndarray
     ) -> tuple[Int[ndarray, " n"], Float32[ndarray, " n"], Float32[ndarray, "n 3"]]:

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64
 from srbf.light_geometry import attenuation, light_vectors, points_on, spot_cone
-from srbf.lights import AreaLight, DirectionalLight, PointLight, SphereLight, SpotLight, radius_of
+from srbf.lights import AreaLight, DirectionalLight, PointLight, SphereLight, SpotLight, has_size, radius_of
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.receivers import disc_points
 
@@ -34,7 +34,7 @@ class LightRays:
 
 def has_extent(light: object, sun_angle: float) -> bool:
     """Whether a light's shadows are soft; `sun_angle`: of suns that do not say their own, rad."""
-    return isinstance(light, AreaLight) or radius_of(light) > 0 or (isinstance(light, DirectionalLight) and light.angle_or(sun_angle) > 0)
+    return has_size(light) or (isinstance(light, DirectionalLight) and light.angle_or(sun_angle) > 0)
 
 
 def rays_towards(

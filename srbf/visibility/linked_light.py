@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Sequence
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float64, Int
-from srbf.errors import InputError
-from srbf.light_linking import Objects, choices_of
+from srbf.errors import ImageError, InputError
+from srbf.light_linking import choices_of
 from srbf.lights import Light
-from srbf.visibility.linked_triangles import occluders_for
 from srbf.visibility.received import ReceivedLight, occluders_of
 from srbf.visibility.surface_cells import Cells
-
-KEPT = 4  # choices of blockers whose triangles are ready
 
 
 class LinkedLight:
@@ -34,27 +30,26 @@ class LinkedLight:
 
     def __init__(self, cells: Cells, scene: bytes, names: Sequence[str], objects: Int[ndarray, " N"] | None) -> None:
         self._cells, self._scene, self._names, self._objects = cells, scene, tuple(names), objects
-        self._received: OrderedDict[Objects | None, ReceivedLight] = OrderedDict()
 
     def irradiance(self, light: Light) -> Float64[ndarray, "N 3"]:
         """As of `ReceivedLight`; 0 on objects that the light does not shine on. InputError where it chooses, and objects are not known."""
         choices = choices_of(light)
-        found = self._of(choices.get("blockers")).irradiance(light)
+        found = ReceivedLight(self._cells, occluders_of(self._scene, choices.get("blockers"))).irradiance(light)
         if "receivers" not in choices:
             return found
         if self._objects is None:
             raise InputError("expected surfels of known objects for a light with `receivers`, found none; bake again")
         return found * choices["receivers"].among(self._names)[self._objects, None]
 
-    def _of(self, blockers: Objects | None) -> ReceivedLight:
-        if blockers not in self._received:
-            while len(self._received) >= KEPT:
-                self._received.popitem(last=False)
-            occluders = occluders_of(self._scene) if blockers is None else occluders_for(self._scene, blockers)
-            self._received[blockers] = ReceivedLight(self._cells, occluders)
-        return self._received[blockers]
-
 
 def surfel_objects(pool: ndarray, names: Sequence[str]) -> Int[ndarray, " S"] | None:
-    """The number of each surfel's object, of a pool (n, S, 4) as pool.exr holds it; None where there are no `names`."""
-    return np.round(pool[2, :, 3]).astype(np.int64) if names else None
+    """The number of each surfel's object, of a pool (n, S, 4) as pool.exr holds it; None where there are no `names`.
+
+    ImageError where a number has no name.
+    """
+    if not names:
+        return None
+    objects = np.round(pool[2, :, 3]).astype(np.int64)
+    if objects.min(initial=0) < 0 or objects.max(initial=0) >= len(names):
+        raise ImageError(f"expected objects 0 to {len(names) - 1} in the pool, found {objects.min()} to {objects.max()}; fit again")
+    return objects

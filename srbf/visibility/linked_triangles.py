@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +9,8 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Int
 from srbf.errors import InputError
-from srbf.io.scene_glb import Triangles, read_triangles
+from srbf.io.scene_glb import Triangles
 from srbf.light_linking import Objects, choices_of
-from srbf.visibility.embree import EmbreeTriangles
 
 
 def lit_triangles(triangles: Triangles, light: object) -> Bool[ndarray, " T"] | None:
@@ -29,13 +27,6 @@ def casting(triangles: Triangles, blockers: Objects | None) -> Triangles:
 def lit_at(lit: Bool[ndarray, " T"] | None, triangle: Int[ndarray, " n"]) -> Bool[ndarray, " n"]:
     """Of points on some triangles, -1 of none, whether these are lit."""
     return np.ones(len(triangle), bool) if lit is None else lit[triangle] | (triangle < 0)
-
-
-@functools.lru_cache(maxsize=16)
-def occluders_for(scene: bytes, blockers: Objects) -> EmbreeTriangles:
-    """What of a scene.glb casts shadows of a light with these blockers, ready for rays; MissingLibraryError without embreex."""
-    triangles = casting(read_triangles(scene), blockers)
-    return EmbreeTriangles(triangles.corners[triangles.occluders])
 
 
 def _chosen(triangles: Triangles, choice: Objects) -> Bool[ndarray, " T"]:

@@ -81,14 +81,14 @@ class PixelLookups:
             own, ones = np.searchsorted(self.pixels, samples.texel), np.ones(len(found))
             shown = lit_at(lit, samples.triangle)[:, None].astype(np.float32)
             if sized is None:
-                sums.add(own, samples.share, ones, found[:, :3] * shown, ones)
+                sums.add(own, max(1, len(own) // max(1, len(self.pixels))), samples.share, ones, found[:, :3] * shown, ones)
                 continue
             exact, whole = irradiance_from(sized, part.place, part.normal), found[:, 3].astype(np.float64)
             importance = np.where(exact > 0, np.maximum(whole / np.where(exact > 0, exact, 1), MIN_IMPORTANCE), 1)
             visible = visible_part(found) * shown
             if isinstance(sized, PointLight):
                 visible = visible * sized.factors(part.place - np.array(sized.position)).astype(np.float32)
-            sums.add(own, samples.share, importance, visible, exact)
+            sums.add(own, max(1, len(own) // max(1, len(self.pixels))), samples.share, importance, visible, exact)
         return sums.mean().astype(np.float32)
 
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.errors import ImageError
 from srbf.lights import AreaLight, Light, PointLight
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.received import lift_of
+from srbf.visibility.received import starts_of
 from srbf.visibility.surface_cells import Cells
 
 FINEST = 2.0  # width of the finest cells, in sides of the median surfel
@@ -105,8 +105,8 @@ def _seen_as_one(
 ) -> tuple[Int[ndarray, " S"], Float64[ndarray, "C 3"]]:
     """Cells of surfels that see the place of their cell, of those that a grid puts together by `number`: (cells, places, m)."""
     found, seen = np.zeros(len(number), np.int64), []
-    left, count, lift = np.arange(len(number)), 0, lift_of(places)
-    starts = places + lift * normals
+    left, count = np.arange(len(number)), 0
+    starts = starts_of(places, normals).astype(np.float64)
     for last in [False] * (ROUNDS - 1) + [True]:
         if not len(left):
             break
@@ -124,13 +124,7 @@ def _seen_as_one(
         count += len(place)
         if last:
             break
-        hidden = _hidden(starts[left], place[group], occluders)
+        hidden = occluders.between(starts[left], place[group])
         hidden[np.isin(left, chosen)] = False
         left = left[hidden]
     return found, np.concatenate(seen) if seen else np.zeros((0, 3))
-
-
-def _hidden(starts: Float64[ndarray, "n 3"], places: Float64[ndarray, "n 3"], occluders: EmbreeTriangles) -> Bool[ndarray, " n"]:
-    toward = places - starts
-    distance = np.linalg.norm(toward, axis=1)
-    return occluders.occluded(starts, toward / np.maximum(distance, 1e-30)[:, None], distance)

@@ -17,6 +17,7 @@ from srbf.compute.threads import each, one_blas_thread
 from srbf.lights import Light
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.near_cells import NearCells
+from srbf.visibility.received import starts_of
 from srbf.visibility.surface_cells import Cells, frames
 
 BRIGHT = 32.0  # of the mean radiosity, from which a surfel's light is taken out in part; from twice as much on, the whole
@@ -54,6 +55,8 @@ class NearSources:
 
     def by_cell(self) -> list[tuple[int, Int[ndarray, " m"], Float32[ndarray, "m 3"]]]:
         """(cell, which of the n surfels are seen by it, the radiosity of each that is) of every cell that sends light."""
+        if not self.count:
+            return []
         at, side = np.nonzero(self.shares)
         cell = self.cells[at, side]
         order = np.argsort(cell, kind="stable")
@@ -69,7 +72,7 @@ class NearReceivers:
 
     def __init__(self, points: Float[ndarray, "R 3"], normals: Float[ndarray, "R 3"], cells: NearCells, occluders: EmbreeTriangles) -> None:
         self._points, self._normals = np.asarray(points, np.float32), np.asarray(normals, np.float32)
-        self._starts = (points + lift_above(points) * normals).astype(np.float32)
+        self._starts = starts_of(points, normals, lift_above(points))
         self._cells, self._occluders = cells, occluders
         self._known: OrderedDict[int, ndarray] = OrderedDict()
         self.traced = 0  # cells that rays were sent to
@@ -97,10 +100,7 @@ class NearReceivers:
         found: list[ndarray] = [np.zeros(0)] * len(new)
 
         def trace(number: int) -> None:
-            toward = self._cells.places[new[number]] - self._starts
-            distance = np.linalg.norm(toward, axis=1)
-            direction = toward / np.maximum(distance, 1e-30)[:, None]
-            found[number] = np.packbits(~self._occluders.occluded(self._starts, direction, distance))
+            found[number] = np.packbits(~self._occluders.between(self._starts, self._cells.places[new[number]]))
 
         each(trace, len(new))
         self.traced += len(new)

@@ -14,7 +14,7 @@ from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.light_linking import Objects
-from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, radius_of
+from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, has_size
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.environment_rays import RAYS as ENVIRONMENT_RAYS
@@ -163,7 +163,7 @@ class RayTracer:
 
     def _irradiance(self, light: CastingLight) -> Float32[ndarray, "P 3"]:
         self._casting(light.blockers)  # once, before threads ask for it
-        sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), _has_size(light))
+        sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), has_size(light))
         weight = np.zeros(len(sums.total))
         starts = range(0, len(self._texels), max(1, BATCH // self._few))
 
@@ -202,7 +202,7 @@ class RayTracer:
         each(trace, len(starts))
         for samples, visible in found:
             ones = np.ones(len(samples.texel))
-            sums.add(samples.texel, samples.share, ones, visible, ones)
+            sums.add(samples.texel, ENVIRONMENT_POINTS, samples.share, ones, visible, ones)
         return sums.mean().astype(np.float32)
 
     def _under_environment(self, samples: Samples, sampler: EnvironmentSampler, rng: np.random.Generator) -> Float32[ndarray, "n 3"]:
@@ -268,7 +268,7 @@ class RayTracer:
         lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (visible > 0).any(axis=1))
         distance = None if rays.distance is None else rays.distance[lit]
         visible[lit] *= self.reaching(samples, lit, rays.direction[lit].astype(np.float32), distance, light.blockers)
-        sums.add(samples.texel, samples.share, rays.importance, visible, rays.irradiance)
+        sums.add(samples.texel, len(numbers), samples.share, rays.importance, visible, rays.irradiance)
 
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Sample points `numbers` of each texel, ordered by sample."""
@@ -385,10 +385,6 @@ def _most_beside(values: Bool[ndarray, " P"] | Float[ndarray, " P"], height: int
     from scipy import ndimage
 
     return ndimage.maximum_filter(values.reshape(height, -1), 3).ravel()
-
-
-def _has_size(light: CastingLight) -> bool:
-    return isinstance(light, AreaLight) or radius_of(light) > 0
 
 
 def _balanced(turn: Float64[ndarray, "e 4"], count: int) -> Float64[ndarray, "s e 2"]:

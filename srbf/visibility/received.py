@@ -12,8 +12,10 @@ from numpy import ndarray
 from srbf.arrays import Float, Float32, Float64, Int
 from srbf.io.scene_glb import read_triangles
 from srbf.light_geometry import environment_samples, soft_cone
+from srbf.light_linking import Objects
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.linked_triangles import casting
 from srbf.visibility.surface_cells import OFFSET, Cells, frames
 
 SIDE = 4  # points per side of an area light
@@ -23,10 +25,10 @@ NEAR_CONE, WIDEST = 64.0, 2 * np.pi / 3  # of a spot of a half-angle below that,
 Strength = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # (n, 1), or (n, 3) by a profile
 
 
-@functools.lru_cache(maxsize=4)
-def occluders_of(scene: bytes) -> EmbreeTriangles:
-    """What casts shadows in a scene.glb, ready for rays; MissingLibraryError without embreex."""
-    triangles = read_triangles(scene)
+@functools.lru_cache(maxsize=16)
+def occluders_of(scene: bytes, blockers: Objects | None = None) -> EmbreeTriangles:
+    """What casts shadows in a scene.glb, ready for rays, `blockers` alone where a light chooses; MissingLibraryError without embreex."""
+    triangles = casting(read_triangles(scene), blockers)
     return EmbreeTriangles(triangles.corners[triangles.occluders])
 
 

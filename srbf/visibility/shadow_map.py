@@ -14,7 +14,7 @@ from srbf.arrays import Bool, Float32, Float64
 from srbf.errors import ShaderError
 from srbf.gl.context import Limits, create_context
 from srbf.light_linking import Objects
-from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, radius_of, triple
+from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, has_size, triple
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.gl_resources import ProfileTextures, Resources, render
 from srbf.visibility.light_rays import CastingLight
@@ -79,7 +79,7 @@ class ShadowMapper:
         for light in lights:
             if isinstance(light, DirectionalLight):
                 irradiance = self._of_sun(light)
-            elif isinstance(light, AreaLight) or radius_of(light) > 0:
+            elif has_size(light):
                 irradiance = self._of_size(self._from_center(light))
             elif isinstance(light, PointLight):
                 irradiance = self._of_point(self._from_center(light))

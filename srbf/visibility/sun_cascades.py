@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from srbf.arrays import Float, Float64
 from srbf.visibility.shadow import SunFrame
 
 MOST = 5  # maps
+STEPS = 8  # of distances that are tried for them
 RATIO = 2.5  # of the distances that two maps reach to
 FINENESS = 0.5  # texels of a map, over pixels at the nearest receivers, from which on a map is fine enough
 NEAREST = 0.005  # quantile of the distances
@@ -39,17 +41,27 @@ class Cascades:
             self._pixel = np.linalg.norm(corners[0] - corners[3]) / width / max(float(abs(corners[0, 2])), 1e-30)
             self._distances = np.linalg.norm(points + center - np.array(camera["matrix_world"], np.float64)[:3, 3], axis=1)
 
+    @functools.cached_property
+    def _nearest(self) -> float:
+        """The distance of the nearest receivers, m."""
+        assert self._distances is not None
+        return float(np.quantile(self._distances, NEAREST)) if len(self._distances) else 0.0
+
+    @functools.cached_property
+    def _nested(self) -> list[Float[ndarray, "n 3"]]:
+        """The receivers that are nearer than each fraction of the largest distance."""
+        assert self._distances is not None
+        far = float(self._distances.max(initial=0))
+        parts = [self._points[self._distances <= far / RATIO**step] for step in range(1, STEPS + 1)]
+        return [part for part in parts if len(part) >= FEWEST]
+
     def frames(self, direction: Float64[ndarray, " 3"], size: int) -> list[SunFrame]:
         """The frames of maps of `size` texels per side, the finest first; the last one holds all receivers."""
         found = [SunFrame.around(self._points, direction)]
         if self._distances is None:
             return found
-        far = float(self._distances.max(initial=0))
-        nearest = float(np.quantile(self._distances, NEAREST)) if len(self._distances) else far
-        while len(found) < MOST and found[0].extent / size > FINENESS * self._pixel * nearest:
-            far /= RATIO
-            near = self._points[self._distances <= far]
-            if len(near) < FEWEST:
+        for near in self._nested:
+            if len(found) == MOST or found[0].extent / size <= FINENESS * self._pixel * self._nearest:
                 break
             frame = SunFrame.around(near, direction)
             if frame.extent < LEAST_GAIN * found[0].extent:

@@ -63,24 +63,23 @@ class TexelSums:
     def add(
         self,
         texel: Int[ndarray, " n"],
+        samples: int,
         share: Float[ndarray, "n _"],
         importance: Float64[ndarray, " n"],
         visible: Float32[ndarray, "n 3"],
         irradiance: Float64[ndarray, " n"],
     ) -> None:
-        """Add samples: what each sees of the light, and its unshadowed irradiance.
+        """Add so many samples of each of some distinct texels, ordered by sample: what each sees of the light, its unshadowed irradiance.
 
-        They are ordered by sample: distinct texels, and the same again for each further sample. Threads may add to different texels.
+        Threads may add to different texels.
         """
-        if not len(texel):
-            return
-        texels = texel[: np.flatnonzero(texel == texel[0])[1:2].max(initial=0) or None]
+        texels = texel[: len(texel) // samples]
         light = visible * irradiance[:, None].astype(np.float32)
         every = np.broadcast_to(share, light.shape)
         weight = every * importance[:, None] if self.sized else every
 
         def by_sample(values: Float[ndarray, "n 3"]) -> Float[ndarray, "s T 3"]:
-            return values.reshape(-1, len(texels), 3)
+            return values.reshape(samples, len(texels), 3)
 
         def count(sums: Float64[ndarray, "P 3"], values: Float[ndarray, "n 3"]) -> None:
             sums[texels] += by_sample(values).sum(axis=0, dtype=np.float64)

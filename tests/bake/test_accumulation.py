@@ -10,7 +10,7 @@ import pytest
 from srbf.bake.accumulation import NOTHING, Accumulation
 from srbf.bake.folder import LOG, LONGEST_LOG, sweep
 from srbf.bake.light_sets import PlacedLight
-from srbf.bake.settings import PlannedLight
+from srbf.bake.planned_lights import PlannedLight
 
 LIGHT = PlannedLight(3, PlacedLight("directional", (0.0, 0.0, 1.0)), "validation", 8, 0)
 SINGLE = 1e-6  # float32's rounding of a few sums

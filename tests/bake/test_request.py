@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from srbf.bake.light_sets import PlacedLight
+from srbf.bake.planned_lights import PlannedLight
 from srbf.bake.request import RenderRequest
-from srbf.bake.settings import PlannedLight
 from srbf.bake.worker_pool import Task
 
 LIGHT = PlannedLight(7, PlacedLight("directional", (0.0, 0.6, 0.8)), "train", 2, 5)

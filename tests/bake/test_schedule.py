@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from srbf.bake.light_sets import PlacedLight
+from srbf.bake.planned_lights import PlannedLight
 from srbf.bake.schedule import next_samples, render_order
-from srbf.bake.settings import BakeSettings, PlannedLight, Receiver, plan_lights
+from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.sphere import all_around, farthest_points, point_set
 
 RECEIVER = Receiver("lightmap", "Plane")

@@ -84,6 +84,34 @@ def _(evaluate: Evaluate) -> None:
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-4, atol=1e-7)
 
 
+@twin("surfels/near_light.glsl")
+def _(evaluate: Evaluate) -> None:
+    """Of surfels in several cells, which receivers see in part, on three rows of receivers."""
+    rng = np.random.default_rng(84)
+    count, slots, rows, across = 12, 4, 3, 5
+    places, facing = rng.normal(size=(2, count, 3)).astype(np.float32)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    areas, radiosity = rng.uniform(1e-3, 0.1, count).astype(np.float32), rng.uniform(0, 2, (count, 3)).astype(np.float32)
+    slot = rng.integers(0, slots, count)
+    seen = rng.choice(np.array([0, 0.25, 1]), (slots, rows, across))
+    sources = np.stack([np.column_stack(row) for row in ((places, areas), (facing, slot), (radiosity, areas))])
+    at = np.stack(np.meshgrid(np.arange(across), np.arange(rows)), axis=-1).reshape(-1, 2)
+    receivers, normals = rng.normal(size=(2, len(at), 3)).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    found = evaluate(
+        "surfels/near_light.glsl",
+        f"vec4(srbfNearLight(sources, {count}, seen, {rows}, ivec2(c.xy), a.xyz, b.xyz), 0.0)",
+        vec4(receivers),
+        vec4(normals),
+        vec4(at.astype(np.float32), np.zeros(len(at))),
+        images={"sources": sources.astype(np.float32), "seen": seen.reshape(slots * rows, across, 1).astype(np.float32)},
+    )
+    factors = disc_factors(receivers, normals, Cells(places, facing, areas, radiosity, np.arange(count)))
+    expected = (factors * seen[slot[None], at[:, 1:], at[:, :1]]) @ radiosity
+    assert (expected > 0).any() and (expected == 0).any()
+    np.testing.assert_allclose(found[:, :3], expected, rtol=1e-4, atol=1e-6)
+
+
 @twin("methods/deep_framebuffer.glsl")
 def _(evaluate: Evaluate) -> None:
     rng = np.random.default_rng(81)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made_profiles import picture, uneven
 from made_rooms import Room
-from made_views import view_of_room, with_backs, with_lobes, with_specular_albedo
+from made_views import view_of_room, with_backs, with_lobes, with_specular_albedo, without_near
 from typer.testing import CliRunner
 
 from srbf import methods
@@ -25,6 +25,7 @@ from srbf.light_profile import Profile
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight, SphereLight, SpotLight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.relighting.relighter import Relighter
+from srbf.visibility import near_passes
 from srbf.visibility.pool_passes import PoolPasses
 from srbf.visibility.received import ReceivedLight, occluders_of
 from srbf.visibility.surface_cells import Cells
@@ -123,14 +124,30 @@ def test_bright_surfels_light_as_in_numpy(context: Any, tmp_path: Path) -> None:
     room = Room.box((3, 2, 2), 0.25, 0.6, wall=(1.5, 0.6, 1.4), lid=False)
     asset = with_specular_albedo(DeepFramebuffer().encode(view_of_room(tmp_path / "capture", room, 8000, 150, tested=0)))
     light = PointLight((0.03, 1.1, 0.9), (1, 0.5, 0.2), falloff="inverse-square")
-    linked = {name: table for name, table in asset.tables.items() if name != "view_points"}
-    bare = replace(asset, tables=linked | {"view_links": asset.tables["view_links"].copy()})
+    bare = without_near(asset)
     for bounces in (1, 12):
         limited = replace(asset, manifest={**asset.manifest, "gather": {**asset.manifest["gather"], "bounces": bounces}})
         expected = methods.relight(limited, [light])
         with Relighter(limited, context=context) as relighter:
             np.testing.assert_allclose(relighter.relight([light]), expected, atol=TOLERANCE * expected.max())
     assert np.abs(methods.relight(bare, [light]) - expected).max() > 20 * TOLERANCE * expected.max()
+
+
+@pytest.mark.parametrize("slots", [3, 64])
+def test_what_is_seen_of_cells_is_kept(divided: Asset, context: Any, monkeypatch: pytest.MonkeyPatch, slots: int) -> None:
+    """Fewer slots than a light has cells: parts after each other, the same picture; with enough, a light that comes back draws nothing."""
+    monkeypatch.setattr(near_passes, "SLOTS", slots)
+    lights = [PointLight((0.05, 1.0 + 0.1 * step, 0.9), falloff="inverse-square") for step in (0, 1, 0)]
+    with Relighter(divided, context=context) as relighter:
+        drawn = []
+        for light in lights:
+            expected = methods.relight(divided, [light])
+            error = np.abs(relighter.relight([light]) - expected) / expected.max()
+            assert np.mean(error > TOLERANCE) < 0.01  # receivers on the edge of the wall, which rays meet and texels do not
+            passes: Any = relighter._passes
+            drawn.append(passes._near.drawn)
+    assert drawn[0] > 3
+    assert (drawn[2] > drawn[1]) == (slots == 3)
 
 
 def test_lights_add_up_and_direct_light_joins_them(asset: Asset, relighter: Relighter) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from srbf import relight
 from srbf.asset import Asset
 from srbf.bake.gather_set import GatherSet
 from srbf.capture import Capture
-from srbf.errors import ImageError, InputError
+from srbf.errors import ImageError, InputError, ManifestError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import fit
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight, SphereLight, SpotLight
@@ -159,6 +160,16 @@ def test_damaged_links_are_refused(capture: Capture, tmp_path: Path) -> None:
     (tmp_path / GATHER_FILE).write_bytes((tmp_path / GATHER_FILE).read_bytes()[:2000])
     with pytest.raises(ImageError, match="bake again"):
         GatherOperator.read(tmp_path)
+
+
+def test_an_asset_of_an_older_version_is_refused(asset: Asset, tmp_path: Path) -> None:
+    asset.save(tmp_path / "asset")
+    path = tmp_path / "asset" / "asset.json"
+    told = json.loads(path.read_text())
+    del told["near_labels"]
+    path.write_text(json.dumps(told))
+    with pytest.raises(ManifestError, match="fit again"):
+        Asset.open(tmp_path / "asset")
 
 
 def test_light_from_behind_is_kept_in_files_and_at_some_pixels(asset: Asset, tmp_path: Path) -> None:

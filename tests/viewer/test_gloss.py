@@ -37,7 +37,7 @@ from srbf.visibility.receivers import Receivers
 pytest.importorskip("embreex")
 
 SIDE, ZOOM = 24, 16
-APART, MEAN = 3.0, 2.0  # bytes: nine of ten texels, and the mean: a texel at a shadow's edge is a mean of four points here
+APART, MEAN = 3.0, 2.0  # of 255: at the 90 % quantile, and in the mean; at shadow edges the page averages four points per texel
 SHAPED = 3.0  # bytes of the picture under a light with a profile
 SAMPLES = 1000  # places on a light
 HIGH = 2.0  # m: of the camera above the plane
@@ -180,14 +180,14 @@ def test_a_profile_of_the_scene_shapes_light(chromium: Any, shaped: Asset, serve
             return relight(shaped, one)
         return direct_light(shaped, one)
 
-    expected, even = (pictures(one) for one in (lights, [replace(light, profile=None) for light in lights]))  # type: ignore[arg-type]
+    plain: list[Any] = [replace(light, profile=None) for light in lights if isinstance(light, PointLight)]
+    expected, even = pictures(lights), pictures(plain)
     covered = shaped.images["coverage"] > 0.5
     apart = np.abs(saved(chromium, tmp_path) - shown_as(expected))[covered]
     assert np.quantile(apart, 0.95) <= SHAPED, np.quantile(apart, [0.5, 0.9, 0.95, 1])
     assert np.quantile(np.abs(shown_as(even) - shown_as(expected))[covered], 0.5) > 3 * SHAPED
     (found,) = lights_of(chromium, tmp_path, known=shaped)
     np.testing.assert_allclose(pictures(found), expected, atol=1e-3 * expected.max())
-    assert "profile" not in chromium("run", script="document.getElementById('status').textContent")
 
 
 def test_a_render_takes_profiles_of_the_scene_alone(shaped: Asset, tmp_path: Path) -> None:

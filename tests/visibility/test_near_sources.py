@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from made_rooms import Room
-from made_views import view_of_room
+from made_views import view_of_room, without_near
 
 from srbf.asset import Asset
 from srbf.lights import PointLight, SphereLight, SpotLight
 from srbf.methods import linear_response
-from srbf.methods.deep_framebuffer import POINTS, DeepFramebuffer
+from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.near_cells import NearCells
 from srbf.visibility.near_sources import NearPool, NearReceivers, disc_factors
@@ -37,6 +37,7 @@ NEAR_CELLS = NearCells.of(CELLS, OCCLUDERS)
 POOL = NearPool(CELLS, NEAR_CELLS)
 NEAR = PointLight((0.06, 1.2, 0.8), falloff="inverse-square")
 EVEN = 0.06
+JUMP = 0.08  # of the light, in a step: 0.05 by cells that stay, 0.11 without blending, 0.40 by cells made again for each light
 WHOLE = 0.03  # a disc's form factor is not that of a square right beside it
 
 
@@ -79,7 +80,7 @@ def test_cells_are_seen_above_their_surfels_and_parted_by_walls() -> None:
 
 
 def test_what_receivers_see_does_not_jump() -> None:
-    """A light slides 6 cm beside a wall, in front of which are boards: no step changes what it lays on the others by far more than most."""
+    """A light slides 6 cm beside a wall, in front of which are boards: no step changes much of what it lays on the others."""
     boards = np.array([[[0.1, y, 0.0], [0.1, y + 0.1, 0.0], [0.1, y, 4.0]] for y in (0.9, 1.1, 1.3, 1.5)], np.float32)
     occluders = EmbreeTriangles(np.concatenate([ROOM.corners, boards]))
     cells = NearCells.of(CELLS, occluders)
@@ -92,7 +93,7 @@ def test_what_receivers_see_does_not_jump() -> None:
         if former is not None:
             steps.append(np.linalg.norm(found - former) / np.linalg.norm(found))
         former = found
-    assert max(steps) < 4 * np.median(steps)
+    assert max(steps) < JUMP
     assert receivers.traced < len(steps)  # most cells are known from former places
 
 
@@ -114,12 +115,20 @@ def test_what_stands_between_shadows_them() -> None:
     near = POOL.sources(first, NEAR)
     points, normals = np.array([[2.9, 1.2, 0.8], [2.9, 0.3, 1.8]]), np.array([[-1.0, 0, 0]] * 2)
     wall = np.array([[[1.5, 0.0, 0.0], [1.5, 4.0, 0.0], [1.5, 0.0, 4.0]], [[1.5, 4.0, 0.0], [1.5, 4.0, 4.0], [1.5, 0.0, 4.0]]], np.float32)
-    aside = wall + np.array([0, 0, 1.25], np.float32)
-    open_, hidden, above = (
-        NearReceivers(points, normals, NEAR_CELLS, EmbreeTriangles(corners)).irradiance(near) for corners in (ROOM.corners, wall, aside)
+    aside, edge = (wall + np.array([0, 0, height], np.float32) for height in (1.1, 1.35))
+    open_, hidden, above, partly = (
+        NearReceivers(points, normals, NEAR_CELLS, EmbreeTriangles(corners)).irradiance(near)
+        for corners in (ROOM.corners, wall, aside, edge)
     )
     assert (open_ > 0).all() and not hidden.any()
-    assert (above[0] == open_[0]).all() and above[1].sum() < 0.02 * open_[1].sum()
+    assert (above[0] == open_[0]).all() and not above[1].any()
+    toward = near.geometry.places - points[1]
+    distance = np.linalg.norm(toward, axis=1)
+    starts = np.repeat(points[1:], near.count, axis=0)
+    seen = ~EmbreeTriangles(edge).occluded(starts, toward / distance[:, None], distance - 1e-3)
+    factors = disc_factors(points[1:].astype(np.float32), normals[1:].astype(np.float32), near.geometry)[0]
+    assert 0.1 < seen.mean() < 0.9
+    np.testing.assert_allclose(partly[1], (factors * seen) @ near.radiosity, rtol=0.2)  # cells are seen or not as one
 
 
 @pytest.fixture(scope="module")
@@ -131,9 +140,7 @@ def lit(tmp_path_factory: pytest.TempPathFactory) -> Asset:
 def test_pictures_have_no_blotches(lit: Asset) -> None:
     """Light 3 cm off a wall on the one across: even, where links alone scatter."""
     light = PointLight((0.03, 1.1, 0.9), falloff="inverse-square")
-    linked = replace(
-        lit, tables={name: table for name, table in lit.tables.items() if name != POINTS} | {"view_links": lit.tables["view_links"].copy()}
-    )
+    linked = without_near(lit)
     covered = (lit.images["coverage"] > 0.5) & (lit.images["normal"][:, :, 0] < -0.5)
     place = lit.images["position"][covered]
     features = np.column_stack([np.ones(len(place)), place[:, 1:], place[:, 1:] ** 2, place[:, 1] * place[:, 2]])
@@ -161,10 +168,7 @@ def test_light_is_reflected_as_often_as_by_links(lit: Asset, bounces: int) -> No
     """In the sum over all pixels, where blotches of links even out; a bounce adds much more than the tolerance."""
     light = PointLight((0.03, 1.1, 0.9), falloff="inverse-square")
     limited = replace(lit, manifest={**lit.manifest, "gather": {**lit.manifest["gather"], "bounces": bounces}})
-    linked = replace(
-        limited,
-        tables={name: table for name, table in lit.tables.items() if name != POINTS} | {"view_links": lit.tables["view_links"].copy()},
-    )
+    linked = without_near(limited)
     found, expected = linear_response(limited, [light]).sum(), linear_response(linked, [light]).sum()
     assert found == pytest.approx(expected, rel=EVEN)
     assert bounces == 0 or found < 0.8 * linear_response(lit, [light]).sum()

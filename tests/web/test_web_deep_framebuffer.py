@@ -10,7 +10,7 @@ import made_profiles
 import numpy as np
 import pytest
 from made_rooms import Room
-from made_views import view_of_room, with_backs, with_lobes, with_specular_albedo
+from made_views import view_of_room, with_backs, with_lobes, with_specular_albedo, without_near
 
 from srbf import methods
 from srbf.asset import Asset
@@ -133,8 +133,7 @@ def test_bright_surfels_light_as_in_numpy(browser: Any, divided: Asset, weights:
     places = ((0.03, 1.2, 0.9), (0.04, 0.05, 0.9), (1.47, 1.6, 0.5))
     sets: list[list[Light]] = [[PointLight(place, (1, 0.5, 0.2), falloff="inverse-square")] for place in places]
     sets.append([AreaLight((0.05, 1.0, 0.9), u=(0, 0.1, 0), v=(0, 0, -0.1)), LIGHTS["point"]])
-    linked = {name: table for name, table in divided.tables.items() if name != "view_points"}
-    bare = replace(divided, tables=linked | {"view_links": divided.tables["view_links"].copy()})
+    bare = without_near(divided)
     for bounces in (1, 12):
         limited = replace(divided, manifest={**divided.manifest, "gather": {**divided.manifest["gather"], "bounces": bounces}})
         drawn = browser.lightmaps("three-lightmap", browser.serve(limited), [told(*lights) for lights in sets], weights=weights)

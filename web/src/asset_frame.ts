@@ -5,7 +5,7 @@ import { SrbfError } from "./errors";
 import { type AreaLight, type EnvironmentLight, isPunctual, type Light, moved, type NamedLight, type PunctualLight } from "./lights";
 import { lightDomainOf } from "./manifest";
 import type { Matrix4, Triple } from "./matrix";
-import { type Surroundings, surroundings } from "./surroundings";
+import { type EnvironmentDirections, environmentDirections } from "./environment_directions";
 
 /** A unit direction from the surface to the light, in the asset's frame, and its irradiance. */
 export type DistantLight = readonly [direction: Triple, color: Triple];
@@ -16,7 +16,7 @@ export interface LightsInAssetFrame {
   /** Environments around lights inside a scene, in the asset's world. */
   readonly environments: readonly EnvironmentLight[];
   /** Environments around a pool of surfels, as distant lights. */
-  readonly surroundings: readonly Surroundings[];
+  readonly environmentDirections: readonly EnvironmentDirections[];
   readonly assetFromWorld: Matrix4;
   /** Point, spot and sphere lights. */
   readonly punctual: readonly PunctualLight[];
@@ -52,7 +52,7 @@ export function inAssetFrame(asset: Pick<Asset, "manifest" | "assetFromWorld">, 
   return {
     distant: distant(),
     environments: domain === "directions" || domain === "pool" ? [] : lights.filter((light) => light.kind === "environment"),
-    surroundings: domain === "pool" ? lights.filter((light) => light.kind === "environment").map((light) => surroundings(light, assetFromWorld)) : [],
+    environmentDirections: domain === "pool" ? lights.filter((light) => light.kind === "environment").map((light) => environmentDirections(light, assetFromWorld)) : [],
     assetFromWorld,
     punctual: lights.filter(isPunctual).map((light) => moved(light, assetFromWorld)),
     areas: lights.filter((light) => light.kind === "area").map((light) => moved(light, assetFromWorld)),

@@ -4,7 +4,7 @@
  */
 import { SrbfError } from "./errors";
 import type { FloatImage } from "./image";
-import { dot, type Triple } from "./matrix";
+import type { Triple } from "./matrix";
 import type { Occluders } from "./occluders";
 import type { NearCells } from "./near_cells";
 import { type Cells, frame } from "./received_light";
@@ -14,7 +14,7 @@ const MOST = 256; // surfels, the brightest
 export const ENTRIES = 2 * MOST; // surfels, each by two cells
 const [CLOSE, PARTS] = [8, 4]; // sides of a surfel, closer than which to a receiver it counts as so many parts a side
 const LIFT = 1e-3; // of the extent of receivers
-const KEPT = 1024; // cells of which it is known what sees them
+const KEPT = 256; // cells of which it is known what sees them
 
 /** n surfels of a pool. */
 export interface NearSources {
@@ -31,12 +31,6 @@ export interface SendingCell {
   readonly members: readonly number[];
   /** Their radiosity, as much as is seen by this cell. */
   readonly light: readonly Triple[];
-}
-
-/** The place (m) of a light, or the unit direction to a distant one. */
-export interface Toward {
-  readonly place: Triple;
-  readonly distant: boolean;
 }
 
 /** A pool of surfels some of which may be bright, and what these light. */
@@ -78,8 +72,8 @@ export class NearPool {
     this.alone = keys.map((key) => counts.get(key) === 1);
   }
 
-  /** The surfels that are far brighter than the mean under a light of this `irradiance`, (S, 3); undefined where none is. */
-  sources(irradiance: Float64Array, light: Toward): NearSources | undefined {
+  /** The surfels that are far brighter than the mean under a light of this `irradiance`, (S, 3), at a `place` (m), if it has one; undefined where none is. */
+  sources(irradiance: Float64Array, place?: Triple): NearSources | undefined {
     const { areas, count } = this.cells;
     const first = (at: number) => this.albedo[at] * irradiance[at];
     const brightness = new Float64Array(count);
@@ -99,7 +93,7 @@ export class NearPool {
     if (!bright.length) return undefined;
     const parts = bright.map((i) => Math.min(1, brightness[i] / Math.max(least, 1e-30) - 1));
     const places = bright.map((i) => [...this.cells.places.subarray(3 * i, 3 * i + 3)] as unknown as Triple);
-    const shares = this.near.seen(bright, places, bright.map((i) => brightness[i] * areas[i]), light.distant ? undefined : light.place);
+    const shares = this.near.seen(bright, places, bright.map((i) => brightness[i] * areas[i]), place);
     const sending = new Map<number, { members: number[]; light: Triple[] }>();
     shares.forEach((own, i) => {
       for (const [cell, share] of own) {
@@ -117,13 +111,12 @@ export class NearPool {
     const { cells, places, normals } = this;
     const out = new Float64Array(places.length);
     const seen = sending.map(({ cell }) => this.seen(cell, occluders));
+    const sources = surfels.map((surfel) => new Source(cells, surfel));
     const factors = new Float64Array(surfels.length);
     for (let at = 0; at < places.length; at += 3) {
-      const normal: Triple = [normals[at], normals[at + 1], normals[at + 2]];
-      surfels.forEach((surfel, i) => {
-        const s = 3 * surfel;
-        const toward: Triple = [cells.places[s] - places[at], cells.places[s + 1] - places[at + 1], cells.places[s + 2] - places[at + 2]];
-        factors[i] = discFactor(toward, normal, [cells.normals[s], cells.normals[s + 1], cells.normals[s + 2]], cells.areas[surfel]);
+      if (!seen.some((own) => own[at / 3] === 1)) continue;
+      sources.forEach((source, i) => {
+        factors[i] = source.factor(places[at], places[at + 1], places[at + 2], normals[at], normals[at + 1], normals[at + 2]);
       });
       sending.forEach(({ members, light }, number) => {
         if (seen[number][at / 3] === 0) return;
@@ -156,20 +149,40 @@ export class NearPool {
   }
 }
 
-/** `srbfDiscFactor`: what share of a receiver's light a source gives, as a disc; one close to it as a square of 4 x 4 discs. */
-function discFactor(toward: Triple, normal: Triple, facing: Triple, area: number): number {
-  const far = -dot(toward, facing);
-  if (far <= 0) return 0;
-  if (dot(toward, toward) >= CLOSE ** 2 * area) return (far * Math.max(0, dot(toward, normal)) * area) / spread(dot(toward, toward), area);
-  const [tangent, bitangent] = frame(...facing);
-  const [side, part] = [Math.sqrt(area), area / PARTS ** 2];
-  let total = 0;
-  for (let i = 0; i < PARTS ** 2; ++i) {
-    const [s, t] = [side * ((Math.floor(i / PARTS) + 0.5) / PARTS - 0.5), side * (((i % PARTS) + 0.5) / PARTS - 0.5)];
-    const there = toward.map((x, k) => x + s * tangent[k] + t * bitangent[k]) as unknown as Triple;
-    total += (Math.max(0, dot(there, normal)) * part) / spread(dot(there, there), part);
+/** A surfel that lights others. */
+class Source {
+  private readonly place: Triple;
+  private readonly facing: Triple;
+  private readonly area: number;
+  private readonly tangents: readonly [Triple, Triple];
+
+  constructor({ places, normals, areas }: Cells, surfel: number) {
+    const own = (values: Float64Array) => [values[3 * surfel], values[3 * surfel + 1], values[3 * surfel + 2]] as const;
+    this.place = own(places);
+    this.facing = own(normals);
+    this.area = areas[surfel];
+    this.tangents = frame(...this.facing);
   }
-  return total * far;
+
+  /** `srbfDiscFactor`: what share of the light at a place (x, y, z) of this normal it gives, as a disc; close to it as a square of 4 x 4 discs. */
+  factor(x: number, y: number, z: number, nx: number, ny: number, nz: number): number {
+    const { place, facing, area, tangents } = this;
+    const [dx, dy, dz] = [place[0] - x, place[1] - y, place[2] - z];
+    const far = -(dx * facing[0] + dy * facing[1] + dz * facing[2]);
+    if (far <= 0) return 0;
+    const [height, squared] = [dx * nx + dy * ny + dz * nz, dx * dx + dy * dy + dz * dz];
+    if (squared >= CLOSE ** 2 * area) return (far * Math.max(0, height) * area) / spread(squared, area);
+    const [[tx, ty, tz], [bx, by, bz]] = tangents;
+    const [side, part] = [Math.sqrt(area), area / PARTS ** 2];
+    let total = 0;
+    for (let i = 0; i < PARTS ** 2; ++i) {
+      const s = side * ((Math.floor(i / PARTS) + 0.5) / PARTS - 0.5);
+      const t = side * (((i % PARTS) + 0.5) / PARTS - 0.5);
+      const [ox, oy, oz] = [dx + s * tx + t * bx, dy + s * ty + t * by, dz + s * tz + t * bz];
+      total += (Math.max(0, ox * nx + oy * ny + oz * nz) * part) / spread(ox * ox + oy * oy + oz * oz, part);
+    }
+    return total * far;
+  }
 }
 
 const spread = (squared: number, area: number) => Math.max(squared, 1e-12) * (Math.PI * Math.max(squared, 1e-12) + area);

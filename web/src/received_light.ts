@@ -6,7 +6,7 @@ import { type AreaLight, type DirectionalLight, type PunctualLight, unit } from 
 import { cross, type Triple } from "./matrix";
 import type { Occluders } from "./occluders";
 import { profileLook } from "./point_light";
-import type { Surroundings } from "./surroundings";
+import type { EnvironmentDirections } from "./environment_directions";
 
 const OFFSET = 1e-4; // of the scene's size: between a surface and the end of a ray to it
 export const SIDE = 4; // points per side of an area light
@@ -56,8 +56,8 @@ export class Cells {
   }
 
   /** Mean irradiance of every patch under a light in white, (n, 3), 0 past the K patches; `far`: how far a distant light's shadow rays go, m. */
-  under(light: PunctualLight | AreaLight | DirectionalLight | Surroundings, occluders: Occluders, far: number, n = this.patches): Float64Array {
-    if (light.kind === "surroundings") {
+  under(light: PunctualLight | AreaLight | DirectionalLight | EnvironmentDirections, occluders: Occluders, far: number, n = this.patches): Float64Array {
+    if (light.kind === "environment-directions") {
       const out = new Float64Array(3 * n);
       for (const [direction, color] of light.directions) {
         this.underDistant(direction, occluders, far).forEach((x, i) => {
@@ -69,12 +69,13 @@ export class Cells {
     if (light.kind === "area") return rgb(this.underArea(light, occluders), n);
     if (light.kind === "directional") return rgb(this.underDistant(light.direction, occluders, far), n);
     if (!light.profile || light.profile.gray) return rgb(this.underPoint(light, occluders), n);
-    const colors = [0, 1, 2].map((c) => this.underPoint(light, occluders, c));
+    const known = new Int8Array(this.count); // of each cell: 0 not known, 1 seen, 2 hidden
+    const colors = [0, 1, 2].map((c) => this.underPoint(light, occluders, c, known));
     return Float64Array.from({ length: 3 * n }, (_, i) => colors[i % 3][Math.floor(i / 3)] ?? 0);
   }
 
-  /** Mean irradiance of every patch under a white point, spot or sphere light, (K,); `c`: which color of a profile. */
-  private underPoint(light: PunctualLight, occluders: Occluders, c = 0): Float64Array {
+  /** Mean irradiance of every patch under a white point, spot or sphere light, (K,); `c`: which color of a profile; `known`: what cells see it. */
+  private underPoint(light: PunctualLight, occluders: Occluders, c = 0, known = new Int8Array(this.count)): Float64Array {
     const shape = profileLook(light);
     const along = light.direction ?? [0, 0, -1];
     const out = new Float64Array(this.patches);
@@ -86,7 +87,7 @@ export class Cells {
       if (!shape || lit <= 0) return lit;
       const away = ([x, y, z]: Triple) => -(ux * x + uy * y + uz * z);
       return lit * shape.profile.at(away(shape.across), away(shape.up), away(along), shape.tangent, c);
-    }, cone && cone.outer > WIDEST ? NEAR_CONE : NEAR);
+    }, cone && cone.outer > WIDEST ? NEAR_CONE : NEAR, known);
     return this.means(out);
   }
 
@@ -125,6 +126,7 @@ export class Cells {
     occluders: Occluders,
     strength: (squared: number, ux: number, uy: number, uz: number, least: number) => number,
     sides = NEAR,
+    known = new Int8Array(this.count),
   ): void {
     const { places, starts, normals, areas, owners } = this;
     for (let i = 0; i < this.count; ++i) {
@@ -152,7 +154,8 @@ export class Cells {
       } else amount = falling(x, y, z, least);
       if (amount <= 0) continue;
       const [sx, sy, sz] = [starts[at], starts[at + 1], starts[at + 2]];
-      if (!occluders.between(sx, sy, sz, place[0] - sx, place[1] - sy, place[2] - sz)) out[owners[i]] += areas[i] * amount;
+      known[i] ||= occluders.between(sx, sy, sz, place[0] - sx, place[1] - sy, place[2] - sz) ? 2 : 1;
+      if (known[i] === 1) out[owners[i]] += areas[i] * amount;
     }
   }
 

@@ -5,7 +5,7 @@ import { type AreaLight, type DirectionalLight, type PunctualLight, unit } from 
 import { cross, type Triple } from "./matrix";
 import { type ProfileLook, profileLook } from "./point_light";
 import { type Cells, SIDE } from "./received_light";
-import type { Surroundings } from "./surroundings";
+import type { EnvironmentDirections } from "./environment_directions";
 
 export interface Surfels {
   readonly cells: Cells;
@@ -92,14 +92,14 @@ export interface Look {
   readonly shape?: ProfileLook;
 }
 
-export type Placed = PunctualLight | AreaLight | DirectionalLight | Surroundings;
+export type Placed = PunctualLight | AreaLight | DirectionalLight | EnvironmentDirections;
 
 /** The looks of a light in the asset's frame: one, a grid of points of an area, or directions of an environment. */
 export function looksOf(light: Placed, middle: Triple): Look[] {
   const away = (p: Triple): Triple => [p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]];
   const plain = { distant: false, axis: [0, 0, 1] as Triple, a0: 1, radius: 1e-4, falloff: "inverse-square", lambertian: false } as const;
   if (light.kind === "directional") return [{ ...plain, distant: true, place: light.direction, color: light.color }];
-  if (light.kind === "surroundings") return light.directions.map(([place, factor]) => ({ ...plain, distant: true, place, color: light.color, factor }));
+  if (light.kind === "environment-directions") return light.directions.map(([place, factor]) => ({ ...plain, distant: true, place, color: light.color, factor }));
   if (light.kind === "area") {
     const { position, u, v, a0 } = light;
     const axis = unit(cross(u, v));
@@ -115,9 +115,9 @@ export function looksOf(light: Placed, middle: Triple): Look[] {
 }
 
 /** Lights that lay irradiance on cells. */
-export function placed({ punctual, areas, distant, surroundings }: LightsInAssetFrame): Placed[] {
+export function placed({ punctual, areas, distant, environmentDirections }: LightsInAssetFrame): Placed[] {
   const suns = [...distant].map(([direction, color]) => ({ kind: "directional", direction, color }) as const);
-  return [...punctual, ...areas, ...suns, ...surroundings];
+  return [...punctual, ...areas, ...suns, ...environmentDirections];
 }
 
 function middleOf(points: Float64Array): Triple {

@@ -46,7 +46,7 @@ export function missingLine({ manifest }: Asset): string {
   const left = (manifest.scene_lights_left_out ?? []).map(({ name }) => name);
   return [
     beyond.length ? `lights past ${MOST_LIGHTS}: ${beyond.join(", ")}` : "",
-    linked.length ? `shown without the objects that they choose: ${linked.join(", ")}` : "",
+    linked.length ? `light linking not shown: ${linked.join(", ")}` : "",
     left.length ? `lights left out: ${left.join(", ")}` : "",
   ]
     .filter(Boolean)

@@ -3,7 +3,7 @@ import { DataTexture, FloatType, LinearFilter, NoColorSpace, RGBAFormat } from "
 import { type FloatImage, SrbfError } from "../src";
 import { decodeFloat } from "../src/exr";
 import { fetched } from "../src/files";
-import type { LightState } from "./light_state";
+import { type LightState, shiningOf } from "./light_state";
 import { lineOf, say } from "./messages";
 import { frameOf } from "./saving";
 import type { ScreenUniforms } from "./screen";
@@ -74,6 +74,7 @@ export class Cycles {
   /** Render the present lights. */
   async render(lights: readonly LightState[]): Promise<void> {
     if (this.rendering) return;
+    if (hasEnvironment(lights)) return say("expected lights inside the scene for a render by Cycles, found an environment; turn it off");
     this.rendering = true;
     this.status = { state: "idle" };
     this.page.wait();
@@ -162,6 +163,8 @@ export class Cycles {
     throw new SrbfError(error);
   }
 }
+
+const hasEnvironment = (lights: readonly LightState[]): boolean => shiningOf(lights).some(({ kind }) => kind === "environment");
 
 /** The lights that shine, as the server takes them. */
 const asked = (lights: readonly LightState[]): string => JSON.stringify(frameOf(lights).lights);

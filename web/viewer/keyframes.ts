@@ -64,12 +64,21 @@ export class Keyframes {
       }
       return false;
     }
-    const others = frame.length !== lights.length || frame.some(({ kind }, i) => kind !== lights[i].kind);
+    const others = frame.length !== lights.length || frame.some((light, i) => light.kind !== lights[i].kind || profileOf(light) !== profileOf(lights[i]));
     if (others) lights.splice(0, lights.length, ...frame.map((light) => structuredClone(light)));
-    else frame.forEach((light, i) => Object.assign(lights[i], structuredClone(light)));
+    else frame.forEach((light, i) => become(lights[i], structuredClone(light)));
     this.state.selected = Math.min(this.state.selected, lights.length - 1);
     return others;
   }
+}
+
+const profileOf = (light: LightState) => ("profile" in light ? light.profile : undefined);
+
+/** Give a light, which controls hold, all that another one has; whether it shines alone stays. */
+function become(light: LightState, other: LightState): void {
+  const own = light as unknown as Record<string, unknown>;
+  for (const key of Object.keys(own)) if (key !== "solo" && !(key in other)) delete own[key];
+  Object.assign(light, other);
 }
 
 /** The state of a light of FRAMES.json, whose profile is one of `profiles`. @throws SrbfError that names `where`. */
@@ -101,13 +110,12 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
   if (entry.kind !== "point" && entry.kind !== "spot" && entry.kind !== "sphere") return bad("lights of named, directional, point, spot, sphere, area", entry.kind);
   const falloff = (entry.falloff ?? usual) === "inverse-square" ? "inverse-square" : "linear";
   const position = triple("position");
-  const axis = triple("direction", [0, 0, -1]);
+  const axis = triple("direction", entry.kind === "spot" ? undefined : [0, 0, -1]);
   const degrees = (key: string) => round((number(key, 0) * 180) / Math.PI);
-  const shape = entry.profile === undefined ? {} : { profile: entry.profile as string, roll: degrees("roll"), ...(entry.kind === "spot" ? {} : { direction: axis }) };
+  const shape = entry.profile === undefined ? {} : { profile: entry.profile as string, roll: degrees("roll"), ...(entry.kind === "spot" ? {} : { direction: rounded(axis) }) };
   const point = { ...common, position: rounded(position), a0: round(number("a0", 1)), falloff, radius: round(number("radius", DEFAULT_RADIUS)), ...shape } as const;
   if (entry.kind === "point") return { kind: "point", ...point };
   if (entry.kind === "sphere") return { kind: "sphere", ...point, size: round(number("size", 0.05)) };
-  triple("direction");
   const target = rounded([position[0] + axis[0], position[1] + axis[1], position[2] + axis[2]]);
   return { kind: "spot", ...point, target, inner: degrees("inner"), outer: degrees("outer") };
 }

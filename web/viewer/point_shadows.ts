@@ -49,9 +49,9 @@ export class PointShadows {
     profileTangent: { value: 0 },
     partAcross: { value: [0, 0, 0] as number[] },
     partUp: { value: [0, 0, 0] as number[] },
-    ball: { value: [0, 0, 0, 0] as number[] },
-    ballPart: { value: 0 },
-    ballParts: { value: SPHERE_LOOKS },
+    sphere: { value: [0, 0, 0, 0] as number[] },
+    sphereLook: { value: 0 },
+    sphereLooks: { value: SPHERE_LOOKS },
   };
   private readonly profiles = new ProfileTextures();
   private readonly fine: ShadowMaps;
@@ -77,7 +77,7 @@ export class PointShadows {
     uniforms.profiled.value = shape !== undefined;
     if (shape) for (const [name, value] of Object.entries(this.profiles.uniforms(shape))) uniforms[name as "profile"].value = value as never;
     uniforms.partAcross.value = uniforms.partUp.value = [0, 0, 0];
-    uniforms.ball.value = [0, 0, 0, 0];
+    uniforms.sphere.value = [0, 0, 0, 0];
     if (light.kind === "area") {
       const { position, u, v, a0, color } = light;
       const direction = unit(cross(u, v));
@@ -88,9 +88,9 @@ export class PointShadows {
       for (const place of places) this.cube(sum, { ...base, position: place, color: shared(color, places.length) }, COARSE, 1);
     } else if (light.kind === "sphere") {
       const places = looks(light.position, light.size);
-      uniforms.ball.value = [...light.position.map((x, k) => x - this.center[k]), light.size];
+      uniforms.sphere.value = [...light.position.map((x, k) => x - this.center[k]), light.size];
       places.forEach((position, i) => {
-        uniforms.ballPart.value = i;
+        uniforms.sphereLook.value = i;
         this.cube(sum, { ...light, kind: "point", position, color: shared(light.color, places.length) }, COARSE);
       });
     } else if (light.kind === "spot" && light.outer <= WIDEST) this.cone(sum, light);

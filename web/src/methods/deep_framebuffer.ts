@@ -29,7 +29,7 @@ export const deepFramebuffer: Method = {
     }
     for (const key of ["pool", "view_links", "view_rows", "exchange_links", "exchange_rows"] as const) if (typeof manifest[key]?.file !== "string") fail(key, manifest[key]);
     if (manifest.behind_neighbors !== undefined && typeof manifest.behind_neighbors.file !== "string") fail("behind_neighbors", manifest.behind_neighbors);
-    if (manifest.view_points !== undefined) for (const key of NEAR_FILES) if (typeof manifest[key]?.file !== "string") fail(`${key}; fit again`, manifest[key]);
+    if (manifest.view_points !== undefined) for (const key of NEAR_FILES) if (typeof manifest[key]?.file !== "string") fail(`${key} beside view_points, which earlier versions did not write,`, manifest[key]);
     if (manifest.gather?.lobes !== undefined) {
       for (const key of ["lobes", "gloss_rays"] as const) if (!(Number.isInteger(manifest.gather[key]) && (manifest.gather[key] as number) >= 1)) fail(`gather with ${key} of at least 1`, manifest.gather);
       for (const key of ["gloss_links", "gloss_rows", "gloss_neighbors"] as const) if (typeof manifest[key]?.file !== "string") fail(key, manifest[key]);
@@ -103,8 +103,7 @@ function projection(gather: Gather): Tables["projectedWeights"] {
   const white = (light: Placed): Float64Array => {
     occluders ??= new Occluders(corners);
     const irradiance = cells.under(light, occluders, FAR, cells.count);
-    const toward = "position" in light ? { place: light.position, distant: false } : { place: light.kind === "directional" ? light.direction : ([0, 0, 1] as Triple), distant: true };
-    const near = gather.near?.sources(irradiance, toward);
+    const near = gather.near?.sources(irradiance, "position" in light ? light.position : undefined);
     return gathered(gather, irradiance, near && gather.near && { far: without(near, irradiance), sent: gather.near.irradiance(near, occluders) });
   };
   return (lights) => {

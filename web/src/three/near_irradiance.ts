@@ -46,8 +46,6 @@ export class NearIrradiance {
   private slots = SLOTS;
   private readonly kept = new Map<number, number>(); // slots of cells, those asked for last at the end
   private readonly read: Float32Array;
-  /** Cells whose visibility was drawn. */
-  drawn = 0;
 
   /** `cells`: of the pool, as `direct` has them, in the pool's order: each is its own patch. */
   constructor(
@@ -75,7 +73,7 @@ export class NearIrradiance {
     renderer.readRenderTargetPixels(irradiance, 0, 0, cells.width, cells.height, read);
     const values = new Float64Array(3 * pool.cells.count);
     for (let i = 0; i < pool.cells.count; ++i) for (let c = 0; c < 3; ++c) values[3 * i + c] = read[4 * i + c];
-    const near = pool.sources(values, { place: this.placeOf(looks), distant: looks[0].distant });
+    const near = pool.sources(values, looks[0].distant ? undefined : this.middleOf(looks));
     if (!near) return undefined;
     const far = this.far.image.data as unknown as Float32Array;
     const toLobes = this.taken?.image.data as unknown as Float32Array | undefined;
@@ -108,9 +106,8 @@ export class NearIrradiance {
     for (const one of [this.far, this.sources, ...this.textures, ...sets]) one.dispose();
   }
 
-  /** The middle of a light's looks, or its direction. */
-  private placeOf(looks: readonly Look[]): Triple {
-    if (looks[0].distant) return looks[0].place;
+  /** The middle of a light's looks. */
+  private middleOf(looks: readonly Look[]): Triple {
     return this.cells.middle.map((x, k) => x + looks.reduce((sum, { place }) => sum + place[k], 0) / looks.length) as unknown as Triple;
   }
 
@@ -161,7 +158,6 @@ export class NearIrradiance {
 
   /** What all receivers see of a cell. */
   private drawSeen(renderer: WebGLRenderer, cell: number, slot: number): void {
-    ++this.drawn;
     const light = this.pool.near.place(cell).map((x, k) => x - this.cells.middle[k]) as unknown as Triple;
     const { nearness } = this.direct.maps.draw(renderer, light, false, NEAREST);
     for (const { seeing, seen, rows } of this.receivers(renderer)) {

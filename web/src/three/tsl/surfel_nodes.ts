@@ -3,12 +3,12 @@ import { Color, type DataTexture, type DepthTexture, FloatType, NearestFilter, R
 import * as tsl from "three/tsl";
 import type { Renderer } from "three/webgpu";
 import type { Asset } from "../../asset";
+import { SrbfError } from "../../errors";
 import type { LightValues } from "../../light_values";
 import type { Triple } from "../../matrix";
 import { versine as versineOf } from "../../point_light";
 import { type ShapeLights, shapeState, shapeWeights } from "../../shape_weights";
 import { packedCells, packedReflectance, shapesTable, square } from "../../surfels";
-import { SrbfError } from "../../errors";
 import type { EngineShadow, ShadowedLook } from "../engine_shadows";
 import { floatTexture } from "../float_textures";
 import { surfelsOf } from "../surfel_weights";
@@ -92,13 +92,13 @@ export class SurfelNodes {
   }
 
   draw(renderer: Renderer, looks: readonly ShadowedLook[]): void {
+    if (looks.some(({ shape }) => shape)) throw new SrbfError('expected lights without a profile for weights "gpu" of nodes, found one; take weights: "cpu"');
     const kept = { target: renderer.getRenderTarget(), color: renderer.getClearColor(new Color() as never) as unknown as Color, alpha: renderer.getClearAlpha() };
     renderer.setClearColor(new Color(0, 0, 0), 0);
     renderer.setRenderTarget(this.sums[0]);
     renderer.clear();
     let from: 0 | 1 = 0;
     const used = new Map<DepthTexture, Shadowed>();
-    if (looks.some(({ shape }) => shape)) throw new SrbfError('expected lights without a profile for weights "gpu" of nodes, found one; take weights: "cpu"');
     for (const look of looks) {
       const shadowed = look.shadow && this.shadowed(renderer, look, look.shadow, used);
       this.set(renderer, look);

@@ -7,21 +7,21 @@ import type { Matrix4, Triple } from "./matrix";
 const [ROWS, COLUMNS] = [16, 32]; // of blocks of a map
 
 /** An environment in the asset's frame: what shines from each direction, and the color that multiplies all of it. */
-export interface Surroundings {
-  readonly kind: "surroundings";
+export interface EnvironmentDirections {
+  readonly kind: "environment-directions";
   readonly color: Triple;
   readonly directions: readonly DistantLight[];
 }
 
 const known = new WeakMap<object, Map<string, readonly DistantLight[]>>(); // by the map's pixels and the frame: a map of millions is summed once
 
-export function surroundings({ pixels, width, height, color }: EnvironmentLight, assetFromWorld: Matrix4): Surroundings {
+export function environmentDirections({ pixels, width, height, color }: EnvironmentLight, assetFromWorld: Matrix4): EnvironmentDirections {
   const own = known.get(pixels as object) ?? new Map<string, readonly DistantLight[]>();
   known.set(pixels as object, own);
   const key = JSON.stringify([width, height, assetFromWorld]);
   const directions = own.get(key) ?? blocksOf({ pixels, width, height }, assetFromWorld);
   own.set(key, directions);
-  return { kind: "surroundings", color, directions };
+  return { kind: "environment-directions", color, directions };
 }
 
 /** The middle of each block of a map, and what shines from all of it. */
