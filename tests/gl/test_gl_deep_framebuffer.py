@@ -133,11 +133,11 @@ def test_bright_surfels_light_as_in_numpy(context: Any, tmp_path: Path) -> None:
     assert np.abs(methods.relight(bare, [light]) - expected).max() > 20 * TOLERANCE * expected.max()
 
 
-@pytest.mark.parametrize("slots", [3, 64])
+@pytest.mark.parametrize("slots", [1, 64])
 def test_what_is_seen_of_cells_is_kept(divided: Asset, context: Any, monkeypatch: pytest.MonkeyPatch, slots: int) -> None:
-    """Fewer slots than a light has cells: parts after each other, the same picture; with enough, a light that comes back draws nothing."""
+    """A light that comes back to a wall draws no cell a second time, unless the slot went to another cell meanwhile."""
     monkeypatch.setattr(near_passes, "SLOTS", slots)
-    lights = [PointLight((0.05, 1.0 + 0.1 * step, 0.9), falloff="inverse-square") for step in (0, 1, 0)]
+    lights = [PointLight((place, 1.0, 0.9), falloff="inverse-square") for place in (0.05, 2.95, 0.05)]
     with Relighter(divided, context=context) as relighter:
         drawn = []
         for light in lights:
@@ -146,8 +146,8 @@ def test_what_is_seen_of_cells_is_kept(divided: Asset, context: Any, monkeypatch
             assert np.mean(error > TOLERANCE) < 0.01  # receivers on the edge of the wall, which rays meet and texels do not
             passes: Any = relighter._passes
             drawn.append(passes._near.drawn)
-    assert drawn[0] > 3
-    assert (drawn[2] > drawn[1]) == (slots == 3)
+    assert 0 < drawn[0] < drawn[1]
+    assert (drawn[2] > drawn[1]) == (slots == 1)
 
 
 def test_lights_add_up_and_direct_light_joins_them(asset: Asset, relighter: Relighter) -> None:
