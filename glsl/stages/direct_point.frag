@@ -88,7 +88,8 @@ vec3 reflected(ivec2 at, vec3 point, vec3 normal, vec3 lightVector) {
             toPlace += part.x * partAcross + part.y * partUp;
         }
         vec3 toLight = srbfLightDirection(toPlace);
-        float strength = srbfPointLightStrength(pointLight, sphere.w > 0.0 ? middle : toPlace) * mix(1.0, max(dot(-toLight, pointLight.axis), 0.0), lambertian);
+        bool even = sphere.w > 0.0 && pointLight.versineOuter > 2.0;  // a sphere without a cone: what all of it gives at its distance
+        float strength = srbfPointLightStrength(pointLight, even ? middle : toPlace) * mix(1.0, max(dot(-toLight, pointLight.axis), 0.0), lambertian);
         total += srbfTexelLobe(glossy, lobes, lobeAlbedo, at, point, normal, eye, toLight, 0.5 * size / max(length(toPlace), 1e-6)) * strength;
     }
     return total / float(count);

@@ -46,6 +46,14 @@ def view(
         ),
     ] = None,
     blender: Blender = None,
+    profile: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="An IES file, or an image for spots to project, that lights on the page may have; may be given again.",
+            show_default=False,
+        ),
+    ] = None,
     port: Annotated[int, typer.Option(metavar="NUMBER", parser=PORT, help="On 127.0.0.1; 0: any that is free.")] = 0,
     save: Annotated[
         Path | None,
@@ -55,6 +63,7 @@ def view(
     browser: Annotated[bool, typer.Option(help="Open the page, or print its address only.")] = True,
 ) -> None:
     """Show an asset in the browser and move its lights; Ctrl-C ends it."""
+    from srbf.cli.light_arguments import read_profile
     from srbf.receiver_images import MANIFEST as CAPTURE_MANIFEST
     from srbf.viewer.contents import contents_of
 
@@ -66,6 +75,7 @@ def view(
         )
     capture = captures[0] if captures else None
     renders = None
+    profiles = [read_profile(path) for path in profile or ()]
     if scene is None and blender is not None:
         raise typer.BadParameter("expected --scene with --blender, found none")
     if scene is not None:
@@ -74,11 +84,11 @@ def view(
         from srbf.asset import Asset
         from srbf.viewer.cycles import CyclesRenders
 
-        renders = CyclesRenders(Asset.open(assets[0]), scene, blender)
+        renders = CyclesRenders(Asset.open(assets[0]), scene, blender, profiles)
     if save is not None:
-        _save(save, contents_of(assets, None, mesh, probes), capture, force)
+        _save(save, contents_of(assets, None, mesh, probes, profiles=profiles), capture, force)
         return
-    serve(contents_of(assets, capture, mesh, probes, renders), port, browser, renders)
+    serve(contents_of(assets, capture, mesh, probes, renders, profiles), port, browser, renders)
 
 
 def serve(contents: dict[str, Content], port: int = 0, browser: bool = True, renders: CyclesRenders | None = None) -> None:

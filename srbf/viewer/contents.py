@@ -13,6 +13,7 @@ from srbf.channels import GLOSS
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.light_domain import domain_of_asset
+from srbf.light_profile import Profile
 from srbf.methods import method_of
 from srbf.viewer import light_tables, page_manifest
 from srbf.viewer.built_page import page_files
@@ -40,19 +41,22 @@ def contents_of(
     mesh: Path | None = None,
     probes: Path | None = None,
     renders: CyclesRenders | None = None,
+    profiles: Sequence[Profile] = (),
 ) -> dict[str, Content]:
     """All content that the page may request of the assets in `folders`; it shows the first one first, and a sphere lit by `probes`.
 
-    `renders`: what the page may ask Cycles for.
+    `renders`: what the page may ask Cycles for. `profiles`: of files, which its lights may have beside those of the scene's own lights.
 
-    InputError if they, or the capture, belong to different scenes, or the probes to other lights; also the errors of `Asset.open`,
-    `Capture.open` and `page_files`.
+    InputError if they, or the capture, belong to different scenes, the probes to other lights, or where an asset takes no `profiles`; also
+    the errors of `Asset.open`, `Capture.open` and `page_files`.
     """
     page = page_files()
     assets = [Asset.open(folder) for folder in folders]
     for asset, folder in zip(assets, folders, strict=True):
         if not method_of(asset).on_page:
             raise InputError(f"expected an asset that the page shows, found {asset.method} in {folder}; `srbf relight` shows it")
+        if profiles and not method_of(asset).takes_profiles:
+            raise InputError(f"expected an asset of lights inside the scene for profiles, found {asset.method} in {folder}; leave them out")
     _check_siblings(assets, folders)
     references = None
     if capture is not None:
@@ -79,15 +83,15 @@ def contents_of(
         if compared is not None:
             errors = f"{CAPTURE}errors-{i}.json"
             contents[errors] = partial(measures.errors, i)
-        profiles = {}
-        for number, (profile, made) in enumerate(light_tables.profile_files(asset).items()):
-            profiles[profile] = f"profile-{i}-{number}.exr"
-            contents[profiles[profile]] = made
+        tables = {}
+        for number, (profile, (projected, made)) in enumerate(light_tables.profile_files(asset, profiles).items()):
+            tables[profile] = {"file": f"profile-{i}-{number}.exr", "projected": projected}
+            contents[f"profile-{i}-{number}.exr"] = made
         own = page_manifest.described(asset, name, place, f"spectrum-{i}.json", errors)
         if set(GLOSS) <= asset.images.keys():
             contents[light_tables.LOBE_ALBEDO] = light_tables.lobe_albedo
             own["lobe_albedo"] = light_tables.LOBE_ALBEDO
-        told.append({**own, "profiles": profiles})
+        told.append({**own, "profiles": tables})
     if shown is not None:
         contents[page_manifest.MESH] = shown
     if probed is not None and probes is not None:

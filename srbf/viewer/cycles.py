@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 import threading
+from collections.abc import Sequence
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,10 @@ from srbf.bake.given_reference import GivenReference, StoppedError, changed_line
 from srbf.errors import InputError, SrbfError
 from srbf.io.image import float_exr
 from srbf.light_entries import entry_with_file, lights_of
+from srbf.light_profile import Profile
 from srbf.lights import Light
 from srbf.relighting.scene_lights import profiles_of
+from srbf.viewer.light_tables import name_of
 
 PLACE = "cycles"  # what the page posts to, and the folder of what it gets
 MOST_BYTES = 1 << 20  # of a request
@@ -30,9 +33,10 @@ class CyclesRenders:
     Raises InputError where the asset is not of a view, or there is no .blend.
     """
 
-    def __init__(self, asset: Asset, scene: Path, blender: Path | None = None) -> None:
+    def __init__(self, asset: Asset, scene: Path, blender: Path | None = None, profiles: Sequence[Profile] = ()) -> None:
         require_view(asset, scene)
         self._asset, self._scene, self._blender = asset, scene, blender
+        self._given = {name_of(profile): profile for profile in profiles}
         self._mutex = threading.Lock()
         self._thread: threading.Thread | None = None
         self._halt = threading.Event()
@@ -52,7 +56,7 @@ class CyclesRenders:
             lights, samples = asked["lights"], asked["samples"]
             if not (isinstance(lights, list) and len(lights) <= MOST_LIGHTS and isinstance(samples, int)):
                 raise InputError(f"expected at most {MOST_LIGHTS} `lights` and a number of `samples`, found others")
-            lights = lights_of(lights, "the page's lights", profiles=profiles_of(self._asset))
+            lights = lights_of(lights, "the page's lights", profiles=self._profile)
         except (ValueError, KeyError, TypeError, SrbfError) as error:
             return HTTPStatus.BAD_REQUEST, {"error": " ".join(str(error).split())}
         with self._mutex:
@@ -64,6 +68,9 @@ class CyclesRenders:
             self._thread = threading.Thread(target=self._render, args=(self._number, lights, samples, self._halt), daemon=True)
             self._thread.start()
             return HTTPStatus.ACCEPTED, dict(self._status)
+
+    def _profile(self, name: str) -> Profile:
+        return self._given.get(name) or profiles_of(self._asset)(name)
 
     def stop(self) -> Reply:
         """End the render that runs, if one does, and wait for its process to be gone."""

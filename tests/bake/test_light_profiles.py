@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from light_set_commands import done, refused, scenes_in
 from made_profiles import picture
-from test_scene_lights import VIEW, by_cycles, relative
+from test_scene_lights import VIEW, each_by_cycles, relative
 
 from srbf.asset import Asset
 from srbf.bake.given_reference import render_given
@@ -73,7 +73,7 @@ def test_relighting_by_them_is_what_cycles_renders(shot: Path, scene: Path, tmp_
     words = ["--direct", "shadow-map"] if renderer == "gl" else []
     done("relight", shot / "asset", "--scene-lights", "--renderer", renderer, *words, "-o", tmp_path / "relit.exr")
     relit = read_image(tmp_path / "relit.exr")[:, :, :3]
-    reference = sum(by_cycles(scene, name, SAMPLES) for name in ("Downlight", "Washer"))
+    reference = sum(each_by_cycles(scene, ["Downlight", "Washer"], SAMPLES))
     assert relative(relit, np.asarray(reference)) < PICTURE
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from light_set_commands import done, refused, scenes_in
-from test_scene_lights import VIEW, by_cycles, relative
+from test_scene_lights import VIEW, by_cycles, each_by_cycles, relative
 
 from srbf import relight
 from srbf.asset import Asset
@@ -57,7 +57,7 @@ def test_a_scenes_links_are_taken_by_the_names_of_objects(shot: Path) -> None:
 def test_relighting_by_them_is_what_cycles_renders(shot: Path, scene: Path, tmp_path: Path, words: list[str]) -> None:
     done("relight", shot / "asset", "--scene-lights", *words, "-o", tmp_path / "relit.exr")
     relit = read_image(tmp_path / "relit.exr")[:, :, :3]
-    reference = by_cycles(scene, None, SAMPLES)
+    reference = by_cycles(scene, SAMPLES)
     assert relative(relit, reference) < PICTURE
     np.testing.assert_allclose(relit.mean(axis=(0, 1)), reference.mean(axis=(0, 1)), rtol=0.02)
 
@@ -65,8 +65,8 @@ def test_relighting_by_them_is_what_cycles_renders(shot: Path, scene: Path, tmp_
 @pytest.mark.slow
 def test_each_light_is_what_cycles_renders_and_made_again_there(shot: Path, scene: Path) -> None:
     asset = Asset.open(shot / "asset")
-    for name, light in scene_lights(asset).items():
-        own = by_cycles(scene, name, SAMPLES)
+    lights = scene_lights(asset)
+    for (name, light), own in zip(lights.items(), each_by_cycles(scene, list(lights), SAMPLES), strict=True):
         relit = relight(asset, [light], direct="ray")
         if name == "Nothing":
             assert not own.any() and not relit.any()

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,27 +49,31 @@ def shot(scene: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory)
     return folder, said
 
 
-def by_cycles(scene: Path, light: str | None, samples: int) -> np.ndarray:
-    """(H, W, 3): the scene's own lights as designed, or one of them."""
-    settings = BakeSettings(Receiver.parse("view"), SIDE, SIDE, quantity="radiance")
+def each_by_cycles(scene: Path, names: Sequence[str], samples: int) -> list[np.ndarray]:
+    """(H, W, 3) of each of the scene's own lights."""
+    lights = [{"index": i, "kind": "named", "name": name} for i, name in enumerate(names)]
+    asked = [RenderRequest(None, samples, 5).message() | {"light": light} for light in lights]
+    return _rendered(scene, {"requests": asked, "lit_by": {"kind": "named", "groups": []}})
+
+
+def by_cycles(scene: Path, samples: int) -> np.ndarray:
+    """(H, W, 3): the scene's own lights as designed."""
+    own = {"ambient": RenderRequest(None, samples, 5).message(), "keep_scene_lights": True, "lit_by": {"kind": "own"}, "requests": []}
+    (image,) = _rendered(scene, own)
+    return image
+
+
+def _rendered(scene: Path, asked: dict[str, Any]) -> list[np.ndarray]:
+    settings, found = BakeSettings(Receiver.parse("view"), SIDE, SIDE, quantity="radiance"), []
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
-        asked = RenderRequest(None, samples, 5).message() | {"light": light and {"index": 0, "kind": "named", "name": light}}
-        job = {**base_job(scene, settings, scratch), "requests": [asked], "lit_by": {"kind": "named", "groups": []}}
-        if light is None:
-            job |= {
-                "ambient": RenderRequest(None, samples, 5).message(),
-                "keep_scene_lights": True,
-                "lit_by": {"kind": "own"},
-                "requests": [],
-            }
-        with Worker(job, scratch, scratch / "bake.log", None) as worker:
+        with Worker({**base_job(scene, settings, scratch), **asked}, scratch, scratch / "bake.log", None) as worker:
             for event in worker.events(lambda line: None):
                 if event["event"] == "rendered":
-                    return np.load(scratch / event["files"]["response"])[:, :, :3]
-                if event["event"] == "image" and event["name"] == "ambient":
-                    return np.load(scratch / event["file"])[:, :, :3]
-    raise AssertionError("no image")
+                    found.append(np.load(scratch / event["files"]["response"])[:, :, :3])
+                elif event["event"] == "image" and event["name"] == "ambient":
+                    found.append(np.load(scratch / event["file"])[:, :, :3])
+    return found
 
 
 def relative(image: np.ndarray, reference: np.ndarray) -> float:
@@ -107,9 +112,9 @@ def test_the_lights_are_listed_by_name_with_their_values(shot: tuple[Path, str])
 def test_each_light_has_its_energy(shot: tuple[Path, str], scene: Callable[[str], Path]) -> None:
     """Made again in Cycles from its values, it lays as much light on the view as the scene's own."""
     asset = Asset.open(shot[0] / "asset")
-    for one in asset.manifest["scene_lights"]:
+    lights = asset.manifest["scene_lights"]
+    for one, own in zip(lights, each_by_cycles(scene("designed"), [one["name"] for one in lights], SAMPLES), strict=True):
         made = render_given(asset, scene("designed"), [one["light"]], SAMPLES).image
-        own = by_cycles(scene("designed"), one["name"], SAMPLES)
         np.testing.assert_allclose(made.mean(axis=(0, 1)), own.mean(axis=(0, 1)), rtol=ENERGY, err_msg=one["name"])
         assert relative(made, own) < 0.25, one["name"]  # noise of both, most of it at the disk
 
@@ -119,7 +124,7 @@ def test_relighting_by_them_is_what_cycles_renders(shot: tuple[Path, str], scene
     said = done("relight", folder / "asset", "--scene-lights", "--direct", "ray", "-o", tmp_path / "relit.exr").stderr
     assert "light 'Profile' is left out: its IES texture has no file" in said
     relit = read_image(tmp_path / "relit.exr")[:, :, :3]
-    reference = by_cycles(scene("designed"), None, 2 * SAMPLES)
+    reference = by_cycles(scene("designed"), 2 * SAMPLES)
     assert relative(relit, reference) < PICTURE
     np.testing.assert_allclose(relit.mean(axis=(0, 1)), reference.mean(axis=(0, 1)), rtol=ENERGY)
 

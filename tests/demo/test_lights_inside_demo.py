@@ -16,6 +16,7 @@ from srbf.demo import SCENES, inside
 from srbf.demo.inside import INSIDE, Amount
 from srbf.demo.pictures import bilinear
 from srbf.methods.surface_changes import Surfaces
+from srbf.methods.transfer import Transfer
 from srbf.visibility import transfer_basis
 
 
@@ -66,8 +67,10 @@ def test_a_loft_from_script_to_picture(tmp_path: Path, monkeypatch: pytest.Monke
     loft = INSIDE["loft"]
     small = replace(loft, places=loft.places[:1], draft=Amount(48, 600, 1, 4, (40, 30)))
     monkeypatch.setattr(inside, "INSIDE", {"loft": small})
+    few = replace(Transfer(), clusters=4, surfels=800, rank=48, editable=True)
+    monkeypatch.setattr(inside, "within_budget", lambda *_args, **_named: few)  # has tests of its own
     monkeypatch.setattr(inside, "write_report", lambda *_args, **_named: tmp_path / "index.html")  # has tests of its own
-    for name in ("PLACED", "NEAR", "SPOTS"):
+    for name in ("PLACED", "MOST_PLACED", "NEAR", "SPOTS"):
         monkeypatch.setattr(transfer_basis, name, 40)
     done = CliRunner().invoke(app, ["demo", "--scene", "loft", "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output

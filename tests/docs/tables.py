@@ -74,6 +74,7 @@ ELSEWHERE = {
     "srbf view --scene *": "tests/extension/test_light_this_shot.py::test_a_true_shot_is_served",
     "srbf relight --scene-lights *": "tests/bake/test_scene_lights.py::test_relighting_by_them_is_what_cycles_renders",
     "srbf relight --scene-lights --reference *": "tests/bake/test_scene_lights.py::test_a_relit_picture_is_compared_with_cycles",
+    "srbf view --profile *": "tests/viewer/test_gloss.py::test_a_given_image_is_projected",
     "srbf view --probes *": "tests/viewer/test_ball.py::test_the_command_takes_probes_with_it",
     "npm ci *": "tests/npm_package.py::npm",
     "npm test *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
@@ -84,6 +85,8 @@ ELSEWHERE = {
 
 # Why nothing here runs it to its end. Flags of our own scripts, names of npm's scripts and the files named are checked all the same.
 NOT_RUN = {
+    "make check": "runs before the tests",
+    "python benchmarks/choices.py": "fits glossy boards in a dozen ways: half a minute at its smallest",
     "python benchmarks/bake.py *": "four bakes and twelve fits of each scene, half a minute at their smallest",
     "python benchmarks/pca_visibility.py CAPTURE": "wants a capture of surfels with a scene to trace: a minute at its smallest",
     "python benchmarks/probes.py *": "renders spheres twice under each light: minutes",

@@ -35,7 +35,7 @@ def capture(tmp_path_factory) -> Capture:
 @pytest.fixture(autouse=True)
 def fewer_lights(monkeypatch: pytest.MonkeyPatch) -> None:
     """Shapes of a small room need few lights."""
-    for name, count in (("PLACED", 120), ("NEAR", 40), ("SPOTS", 40)):
+    for name, count in (("PLACED", 120), ("MOST_PLACED", 120), ("NEAR", 40), ("SPOTS", 40)):
         monkeypatch.setattr(transfer_basis, name, count)
 
 

@@ -42,7 +42,7 @@ def capture(tmp_path_factory) -> Capture:
 @pytest.fixture(scope="module")
 def asset(capture: Capture) -> Asset:
     with pytest.MonkeyPatch.context() as patch:
-        for name in ("PLACED", "NEAR", "SPOTS"):
+        for name in ("PLACED", "MOST_PLACED", "NEAR", "SPOTS"):
             patch.setattr(f"srbf.visibility.transfer_basis.{name}", 40)
         patch.setattr("srbf.encode.position_table.MOST_NODES", 64)
         return SETTINGS.encode(capture)

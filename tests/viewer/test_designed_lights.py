@@ -58,12 +58,14 @@ def light(name, kind, **values):
 light("Key", "POINT", energy=1, exposure=2)
 light("Panel", "AREA", shape="DISK")
 light("Globe", "POINT")
+light("Fill <b>", "SPOT", shadow_soft_size=0.3)
 exec(open(sys.argv[1]).read())
 exec(open(sys.argv[1]).read())
 bpy.context.view_layer.update()
 print("TOLD" + json.dumps({
     o.name: [o.data.energy * 2**o.data.exposure, list(o.data.color), [list(row) for row in o.matrix_world], o.hide_render,
-             [c.name for c in o.users_collection], getattr(o.data, "size", 0), getattr(o.data, "shape", "")]
+             [c.name for c in o.users_collection], getattr(o.data, "size", 0), getattr(o.data, "shape", ""),
+             getattr(o.data, "shadow_soft_size", 0)]
     for o in bpy.data.objects
 }))
 """
@@ -258,10 +260,11 @@ def test_the_script_sets_lights_that_the_scene_has_and_makes_the_others(chromium
     assert key[0] == pytest.approx(4 * np.pi, rel=1e-5) and key[2][2][3] == pytest.approx(0.4, abs=1e-5)
     assert panel[0] == pytest.approx(0.5 * np.pi, rel=1e-5) and panel[1] == pytest.approx([0.6, 0.6, 1], abs=1e-5)
     assert panel[5] == pytest.approx(0.6 * 2 / np.sqrt(np.pi), rel=1e-4) and panel[6] == "ELLIPSE"
+    assert fill[7] == pytest.approx(0.02)
     assert [one[3] for one in (key, fill, panel, globe, made)] == [False, False, False, True, False]
     assert [one[4] for one in (key, fill, panel, globe, made)] == [
         ["Scene Collection"],
-        ["srbf lights"],
+        ["Scene Collection"],
         ["Scene Collection"],
         ["Scene Collection"],
         ["srbf lights"],

@@ -14,7 +14,7 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 from closed_forms import ball, build_plane, quad
-from made_profiles import UNEVEN, uneven
+from made_profiles import UNEVEN, picture, uneven
 from made_rooms import Room
 from made_views import view_of_room
 from test_page import HEIGHT, WIDTH, lights_of, shown_as
@@ -22,12 +22,15 @@ from view_assets import scene_glb
 from web_assets import complete
 
 from srbf.asset import Asset
-from srbf.io.image import read_image
+from srbf.cli.light_arguments import read_frames, read_profile
+from srbf.errors import InputError
+from srbf.io.image import read_image, write_picture
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
 from srbf.methods import relight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.relighting.direct_light import Added
 from srbf.unshadowed import irradiance_from
+from srbf.viewer.contents import contents_of
 from srbf.viewer.cycles import CyclesRenders
 from srbf.visibility.glossy_direct import GlossyPixels
 from srbf.visibility.hemisphere import GOLDEN
@@ -55,6 +58,23 @@ INSIDE = (1.1, 0.8, 1.4)
 OVER: dict[str, tuple[dict[str, Any], Light]] = {
     "point": ({"kind": "point", **FADE, "position": PLACE, "a0": 1.0}, PointLight(PLACE, a0=1.0, falloff="inverse-square", radius=0.001)),
     "sun": ({"kind": "directional", "direction": [-0.1, -0.15, 1]}, DirectionalLight((-0.1, -0.15, 1))),
+    "soft sun": (
+        {"kind": "directional", "direction": [-0.1, -0.15, 1], "angle": 8},
+        DirectionalLight((-0.1, -0.15, 1), angle=np.radians(8)),
+    ),
+    "soft spot": (
+        {"kind": "spot", **FADE, "position": PLACE, "target": [0.2, 0.0, 0.0], "a0": 1.0, "inner": 20, "outer": 30, "size": 0.1},
+        SpotLight(
+            PLACE,
+            direction=(-1.1, 0.3, -1.2),
+            inner=np.radians(20),
+            outer=np.radians(30),
+            a0=1.0,
+            falloff="inverse-square",
+            radius=0.1,
+            size=0.1,
+        ),
+    ),
     "behind": (
         {"kind": "point", **FADE, "position": [0.25, -0.3, -1.1], "a0": 1.0},
         PointLight((0.25, -0.3, -1.1), a0=1.0, falloff="inverse-square", radius=0.001),
@@ -188,6 +208,55 @@ def test_a_profile_of_the_scene_shapes_light(chromium: Any, shaped: Asset, serve
     assert np.quantile(np.abs(shown_as(even) - shown_as(expected))[covered], 0.5) > 3 * SHAPED
     (found,) = lights_of(chromium, tmp_path, known=shaped)
     np.testing.assert_allclose(pictures(found), expected, atol=1e-3 * expected.max())
+
+
+@pytest.mark.parametrize("terms", ["indirect", "direct"])
+def test_a_given_image_is_projected(chromium: Any, shaped: Asset, serve: Callable[..., str], tmp_path: Path, terms: str) -> None:
+    """Chosen in the panel; FRAMES.json names the file, which `srbf relight` finds beside it."""
+    write_picture(tmp_path / "gobo.png", picture())
+    gobo = read_profile(tmp_path / "gobo.png")
+    shaped.save(tmp_path / "asset")
+    spot = {"kind": "spot", **COMMON, **FADE, "position": INSIDE, "target": [1.4, 1.0, 0.0], "a0": 1.0, "inner": 30, "outer": 35}
+    state = {"zoom": ZOOM, "middle": [shaped.width / 2, shaped.height / 2], "terms": terms, "exposure": 0, "lights": [spot], "selected": 0}
+    url = serve(tmp_path / "asset", profiles=[gobo])
+    chromium("open", url=f"{url}#{quote(json.dumps(state))}", width=WIDTH, height=HEIGHT)
+    plain = saved(chromium, tmp_path)
+    chromium("choose", selector=".lil-gui .controller:has(.name:text-is('Profile')) select", value="gobo.png")
+    chromium("number", name="Turn of the profile (°)", value=30)
+    found = saved(chromium, tmp_path)
+    path = tmp_path / "FRAMES.json"
+    path.write_bytes(chromium.file("Lights (FRAMES.json)"))
+    ((light,),) = read_frames(path)
+    assert isinstance(light, SpotLight) and light.profile == gobo and light.roll == pytest.approx(np.radians(30))
+    expected = relight(shaped, [light]) if terms == "indirect" else direct_light(shaped, [light])
+    covered = shaped.images["coverage"] > 0.5
+    apart = np.abs(found - shown_as(expected))[covered]
+    assert np.quantile(apart, 0.95) <= SHAPED, np.quantile(apart, [0.5, 0.9, 0.95, 1])
+    assert np.abs(plain - found)[covered].max() > 30
+
+
+def test_profiles_are_of_lights_inside_and_of_one_name_each(shaped: Asset, glossy: Asset, tmp_path: Path) -> None:
+    shaped.save(tmp_path / "shot")
+    glossy.save(tmp_path / "distant")
+    with pytest.raises(InputError, match="expected profiles of different names, found two of Fixture.ies; rename the file"):
+        contents_of([tmp_path / "shot"], profiles=[replace(uneven, file=("Fixture.ies", b""))])
+    with pytest.raises(InputError, match="expected an asset of lights inside the scene for profiles, found relighting-map"):
+        contents_of([tmp_path / "distant"], profiles=[uneven])
+
+
+def test_a_render_takes_given_profiles_by_name(shaped: Asset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shaped.save(tmp_path / "asset")
+    (tmp_path / "shot.blend").write_bytes(b"")
+    own = replace(uneven, file=("Own.ies", b"IES"))
+    renders = CyclesRenders(Asset.open(tmp_path / "asset"), tmp_path / "shot.blend", profiles=[own])
+    begun: list[list[Light]] = []
+    monkeypatch.setattr(renders, "_render", lambda number, lights, samples, halt: begun.append(lights))
+    light = {"kind": "point", "position": [0, 0, 1], "profile": "Own.ies"}
+    status, said = renders.start(json.dumps({"lights": [light], "samples": 1}).encode())
+    renders.stop()
+    assert status == HTTPStatus.ACCEPTED, said
+    ((found,),) = begun
+    assert isinstance(found, PointLight) and found.profile == own
 
 
 def test_a_render_takes_profiles_of_the_scene_alone(shaped: Asset, tmp_path: Path) -> None:

@@ -14,6 +14,8 @@ export interface DirectionalLight {
   readonly kind: "directional";
   readonly direction: Triple;
   readonly color: Triple;
+  /** Angular diameter of its disc, rad, for soft shadows; that of the asset unless given. */
+  readonly angle?: number;
 }
 
 /** A point light; `color` is its irradiance at the distance `a0` (m); |L| is never less than `radius` (m). */
@@ -42,6 +44,8 @@ export interface SpotLight extends Punctual {
   readonly direction: Triple;
   readonly inner: number;
   readonly outer: number;
+  /** Radius (m) of a sphere each point of which shines into the cone; a point unless given. */
+  readonly size?: number;
 }
 
 /** A sphere of radius `size` (m) that shines: far away a point light, its shadows are soft. */
@@ -82,9 +86,10 @@ export interface NamedLight {
 export type Light = DirectionalLight | PointLight | SpotLight | SphereLight | AreaLight | EnvironmentLight | NamedLight;
 export type PunctualLight = PointLight | SpotLight | SphereLight;
 
-/** @throws SrbfError on a direction of no length. */
-export function directionalLight(direction: Triple, color: Triple = WHITE): DirectionalLight {
-  return { kind: "directional", direction: unit(direction), color: finite(color, "color") };
+/** @throws SrbfError on a direction of no length, and an angle outside [0, pi). */
+export function directionalLight(direction: Triple, color: Triple = WHITE, angle?: number): DirectionalLight {
+  if (angle !== undefined && !(0 <= angle && angle < Math.PI)) throw new SrbfError(`expected an angle of 0 to pi rad, found ${angle}`);
+  return { kind: "directional", direction: unit(direction), color: finite(color, "color"), ...(angle === undefined ? {} : { angle }) };
 }
 
 /** @throws SrbfError on numbers that are not finite, or a0 or radius not above 0. */
@@ -93,19 +98,22 @@ export function pointLight(position: Triple, options: Partial<Omit<Punctual, "po
   return { kind: "point", ...punctual(position, options) };
 }
 
-/** @throws SrbfError as `pointLight`, and on half-angles that are not 0 <= inner <= outer <= pi. */
+/** @throws SrbfError as `pointLight`, on half-angles that are not 0 <= inner <= outer <= pi, and on a negative size. */
 export function spotLight(
   position: Triple,
   direction: Triple,
   cone: { inner: number; outer: number },
-  options: Partial<Omit<Punctual, "position">> = {},
+  options: Partial<Omit<Punctual, "position">> & { size?: number } = {},
 ): SpotLight {
   const { inner, outer } = cone;
   if (!(0 <= inner && inner <= outer && outer <= Math.PI)) {
     throw new SrbfError(`expected spot half-angles 0 <= inner <= outer <= pi rad, found inner ${inner}, outer ${outer}`);
   }
   if (options.profile?.projected && !(outer < Math.PI / 2)) throw new SrbfError(`expected a spot of an outer half-angle below pi / 2 to project an image, found ${outer}`);
-  return { kind: "spot", ...punctual(position, options), direction: unit(direction), inner, outer };
+  const { size = 0, ...fade } = options;
+  if (!(size >= 0 && Number.isFinite(size))) throw new SrbfError(`expected size of 0 or above, found ${size}`);
+  const own = punctual(position, fade);
+  return { kind: "spot", ...own, direction: unit(direction), inner, outer, ...(size ? { size, radius: Math.max(own.radius, size) } : {}) };
 }
 
 /** Inverse-square unless `falloff` says otherwise; inside the sphere as strong as on its surface. @throws SrbfError as `pointLight`, and on a size not above 0. */
@@ -154,7 +162,7 @@ export function moved<L extends Light>(light: L, matrix: Matrix4): L {
     const roll = light.profile ? { roll: rollOf(direction, turned(matrix, profileAxes(light.direction, light.roll ?? 0)[0])) } : {};
     Object.assign(out, { direction, ...roll });
   }
-  return light.kind === "sphere" ? { ...out, size: light.size * scale } : out;
+  return "size" in light && light.size ? { ...out, size: light.size * scale } : out;
 }
 
 export function isPunctual(light: Light): light is PunctualLight {

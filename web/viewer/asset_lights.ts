@@ -26,8 +26,8 @@ export function kindsOf(asset: Asset): readonly AddedKind[] {
 /** The lights that the scene has by itself, all of them, as it has them set. @throws SrbfError on damaged ones. */
 export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(light, `light ${name} of the asset`, "inverse-square", profileNames(manifest)), name }) as LightState);
 
-/** The names of the profiles that lights of an asset may have: those of its scene's own lights. */
-export const profileNames = ({ scene_profiles }: Manifest): string[] => Object.keys(scene_profiles ?? {});
+/** The names of the profiles of the scene's own lights. */
+const profileNames = ({ scene_profiles }: Manifest): string[] => Object.keys(scene_profiles ?? {});
 
 /** The scene's own lights as asset.json has them. */
 export type Designed = readonly { name: string; light: Record<string, unknown> }[];

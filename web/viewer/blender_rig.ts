@@ -54,7 +54,7 @@ def own(name, kind):
 
 
 def set_own(light, told):
-    """Set what the page shows of a light: its angle, a spot's size, a disk's shape and the nodes of an IES texture stay."""
+    """Set what the page shows of a light: a disk's shape and the nodes of an IES texture stay."""
     data, settings = light.data, dict(told["settings"])
     if told["profile"] is None:
         data.use_nodes = False
@@ -63,9 +63,6 @@ def set_own(light, told):
     for name, plain in (("exposure", 0), ("use_temperature", False), ("normalize", True)):
         if hasattr(data, name):
             setattr(data, name, plain)
-    if data.type in {"SPOT", "SUN"}:
-        settings.pop("shadow_soft_size", None)
-        settings.pop("angle", None)
     if data.type == "AREA" and data.shape in {"DISK", "ELLIPSE"}:
         data.shape = "ELLIPSE" if data.shape == "ELLIPSE" or abs(settings["size"] - settings["size_y"]) > 1e-5 else "DISK"
         settings = {"size": settings["size"] / ROUND, "size_y": settings["size_y"] / ROUND}
@@ -109,6 +106,8 @@ for told in LIGHTS:
         set_own(light, told)
         continue
     data = bpy.data.lights.new(told["name"], told["type"])
+    if data.type == "SUN":
+        data.angle = 0  # unless told otherwise
     light = bpy.data.objects.new(told["name"], data)
     fill(light, told, told["settings"])
     collection.objects.link(light)
@@ -133,7 +132,7 @@ function placed(light: Made): { matrix: number[][]; settings: Record<string, unk
   if (light.kind === "directional") {
     const back = unit(light.direction);
     const [across, up] = levelSides(back);
-    return { matrix: matrix(across, up, back, [0, 0, 0]), settings: { angle: 0 } };
+    return { matrix: matrix(across, up, back, [0, 0, 0]), settings: light.angle === undefined ? {} : { angle: (light.angle * Math.PI) / 180 } };
   }
   if (light.kind === "point" || light.kind === "sphere") {
     const frame = light.profile === undefined ? undefined : profileFrame(unit(light.direction ?? [0, 0, -1]), light.roll);
@@ -143,7 +142,7 @@ function placed(light: Made): { matrix: number[][]; settings: Record<string, unk
   if (light.kind === "spot") {
     const [inner, outer] = [light.inner, light.outer].map((degrees) => Math.cos((degrees * Math.PI) / 180));
     const [across, up] = light.profile === undefined ? levelSides(back) : profileFrame(unit(aim(light)), light.roll);
-    const settings = { shadow_soft_size: 0, spot_size: (light.outer * Math.PI) / 90, spot_blend: Math.min(1, (inner - outer) / Math.max(1 - outer, 1e-9)) };
+    const settings = { shadow_soft_size: light.size ?? 0, spot_size: (light.outer * Math.PI) / 90, spot_blend: Math.min(1, (inner - outer) / Math.max(1 - outer, 1e-9)) };
     return { matrix: matrix(across, up, back, light.position), settings };
   }
   const across = unit(sides(light)[0]);

@@ -2,7 +2,7 @@
 import { DEFAULT_RADIUS, unit } from "../src/lights";
 import { cross, dot } from "../src/matrix";
 import { SrbfError, type Triple } from "../src";
-import { keptKeys, levelSides, type LightState, round, rounded } from "./light_state";
+import { KEPT_KEYS, levelSides, type LightState, round, rounded } from "./light_state";
 import { MOST_LIGHTS, type State } from "./state";
 
 type Entry = Record<string, unknown>;
@@ -96,28 +96,28 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
     if (!Number.isFinite(value)) bad(`a number of ${key}`, value);
     return value as number;
   };
+  const degrees = (key: string) => round((number(key, 0) * 180) / Math.PI);
   if (entry.profile !== undefined && !profiles.includes(entry.profile as string)) bad(profiles.length ? `a profile of ${profiles.join(", ")}` : "lights without a profile, since this asset has none,", entry.profile);
   const color = triple("color", [1, 1, 1]);
   if (color.some((x) => x < 0)) bad("colors of 0 or more", color);
   const intensity = entry.kind === "named" ? number("intensity", 1) : 1;
   if (intensity < 0) bad("an intensity of 0 or more", intensity);
   const own = typeof entry.name === "string" && entry.kind !== "named" ? { name: entry.name } : {};
-  const kept = Object.fromEntries(keptKeys(entry.kind).flatMap((key) => (entry[key] === undefined ? [] : [[key, entry[key]]])));
+  const kept = Object.fromEntries(KEPT_KEYS.flatMap((key) => (entry[key] === undefined ? [] : [[key, entry[key]]])));
   const common = { on: true, ...own, ...(Object.keys(kept).length ? { kept } : {}), ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
   if (entry.kind === "named") return { kind: "named", ...common, name: typeof entry.name === "string" ? entry.name : bad("a name", entry.name) };
-  if (entry.kind === "directional") return { kind: "directional", ...common, direction: rounded(triple("direction")) };
+  if (entry.kind === "directional") return { kind: "directional", ...common, direction: rounded(triple("direction")), ...(entry.angle === undefined ? {} : { angle: degrees("angle") }) };
   if (entry.kind === "area") return areaOf(triple("position"), triple("u"), triple("v"), round(number("a0", 1)), common);
   if (entry.kind !== "point" && entry.kind !== "spot" && entry.kind !== "sphere") return bad("lights of named, directional, point, spot, sphere, area", entry.kind);
   const falloff = (entry.falloff ?? usual) === "inverse-square" ? "inverse-square" : "linear";
   const position = triple("position");
   const axis = triple("direction", entry.kind === "spot" ? undefined : [0, 0, -1]);
-  const degrees = (key: string) => round((number(key, 0) * 180) / Math.PI);
   const shape = entry.profile === undefined ? {} : { profile: entry.profile as string, roll: degrees("roll"), ...(entry.kind === "spot" ? {} : { direction: rounded(axis) }) };
   const point = { ...common, position: rounded(position), a0: round(number("a0", 1)), falloff, radius: round(number("radius", DEFAULT_RADIUS)), ...shape } as const;
   if (entry.kind === "point") return { kind: "point", ...point };
   if (entry.kind === "sphere") return { kind: "sphere", ...point, size: round(number("size", 0.05)) };
   const target = rounded([position[0] + axis[0], position[1] + axis[1], position[2] + axis[2]]);
-  return { kind: "spot", ...point, target, inner: degrees("inner"), outer: degrees("outer") };
+  return { kind: "spot", ...point, target, inner: degrees("inner"), outer: degrees("outer"), ...(entry.size ? { size: round(number("size", 0)) } : {}) };
 }
 
 function areaOf(position: Triple, u: Triple, v: Triple, a0: number, common: { on: boolean; color: string; intensity: number }): LightState {

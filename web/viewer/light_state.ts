@@ -16,7 +16,7 @@ interface Common {
   kelvin?: number;
   /** Which of the scene's lights it is. */
   name?: string;
-  /** What FRAMES.json has of it and the page does not show: a spot's size, a sun's angle, which objects it lights and which shadow it. */
+  /** What FRAMES.json has of it and the page does not show: which objects it lights and which shadow it. */
   kept?: Record<string, unknown>;
 }
 
@@ -34,6 +34,8 @@ interface PointLight extends Common {
 export interface DirectionalState extends Common {
   kind: "directional";
   direction: Triple;
+  /** Diameter of the sun's disc, degrees; that of the asset unless given. */
+  angle?: number;
 }
 
 export interface PointState extends PointLight {
@@ -46,6 +48,8 @@ export interface SpotState extends PointLight {
   target: Triple;
   inner: number;
   outer: number;
+  /** Radius of what shines, m; a point unless given. */
+  size?: number;
 }
 
 /** A sphere of radius `size`, m. */
@@ -173,7 +177,7 @@ export function linearColor(light: Common): Triple {
 export function lightOf(state: LightState, environments: ReadonlyMap<string, Environment>, profiles: ReadonlyMap<string, Profile> = new Map()): Light | undefined {
   if (!state.on) return undefined;
   const color = linearColor(state);
-  if (state.kind === "directional") return directionalLight(state.direction, color);
+  if (state.kind === "directional") return directionalLight(state.direction, color, state.angle === undefined ? undefined : (state.angle * Math.PI) / 180);
   if (state.kind === "environment") {
     const image = environments.get(state.file);
     return image && environmentLight(image.width, image.height, image.pixels, color);
@@ -185,7 +189,7 @@ export function lightOf(state: LightState, environments: ReadonlyMap<string, Env
   if (state.kind === "point") return pointLight(position, fade);
   if (state.kind === "sphere") return sphereLight(position, state.size, fade);
   const cone = { inner: (state.inner * Math.PI) / 180, outer: (state.outer * Math.PI) / 180 };
-  return spotLight(position, aim(state), cone, fade);
+  return spotLight(position, aim(state), cone, { ...fade, size: state.size });
 }
 
 function shapeOf({ profile, direction, roll = 0 }: PointLight, profiles: ReadonlyMap<string, Profile>): { profile?: Profile; direction?: Triple; roll?: number } {
@@ -217,7 +221,7 @@ export function aim(light: SpotState | AreaState): Triple {
 }
 
 /** Keys of FRAMES.json that the page hands on as they are. */
-export const keptKeys = (kind: unknown): readonly string[] => ["receivers", "blockers", ...(kind === "spot" ? ["size"] : []), ...(kind === "directional" ? ["angle"] : [])];
+export const KEPT_KEYS: readonly string[] = ["receivers", "blockers"];
 
 /** `value` as a light's state. @throws SrbfError on anything else. */
 export function checkLight(value: unknown): LightState {
@@ -235,10 +239,12 @@ export function checkLight(value: unknown): LightState {
   if (!Number.isFinite(light.intensity)) bad("a number of intensity");
   if (light.solo !== undefined && typeof light.solo !== "boolean") bad("true or false of solo");
   if (light.name !== undefined && (typeof light.name !== "string" || light.name === "")) bad("a text of name");
-  if (light.kept !== undefined && (typeof light.kept !== "object" || light.kept === null || Object.keys(light.kept).some((key) => !keptKeys(light.kind).includes(key)))) bad(`${keptKeys(light.kind).join(", ")} of kept`);
+  if (light.kept !== undefined && (typeof light.kept !== "object" || light.kept === null || Object.keys(light.kept).some((key) => !KEPT_KEYS.includes(key)))) bad(`${KEPT_KEYS.join(", ")} of kept`);
   if (light.kelvin !== undefined && !((light.kelvin as number) > 0)) bad("a number above 0 of kelvin");
-  if (light.kind === "directional") triple("direction");
-  else if (light.kind === "environment") {
+  if (light.kind === "directional") {
+    triple("direction");
+    if (light.angle !== undefined && !((light.angle as number) >= 0 && (light.angle as number) < 180)) bad("degrees of angle");
+  } else if (light.kind === "environment") {
     if (typeof light.file !== "string") bad("a name of file");
   } else if (light.kind === "named") {
     if (typeof light.name !== "string") bad("a light's name");
@@ -255,6 +261,7 @@ export function checkLight(value: unknown): LightState {
     if (light.falloff !== "linear" && light.falloff !== "inverse-square") bad("linear or inverse-square of falloff");
     if (light.kind === "spot") {
       triple("target");
+      if (light.size !== undefined && !((light.size as number) >= 0 && Number.isFinite(light.size))) bad("a number of 0 or above of size");
       if (!((light.inner as number) >= 0 && (light.inner as number) <= (light.outer as number) && (light.outer as number) <= 180)) bad("half-angles of inner");
     }
   } else bad("a kind of kind");

@@ -20,8 +20,8 @@ export interface AssetFacts {
   errors: string | null;
   /** The table of `srbf.microfacets.albedo_table`, of views with gloss. */
   lobe_albedo?: string;
-  /** Tables of `srbf.light_profile.Profile`, by the names that the scene's own lights have for them. */
-  profiles: Record<string, string>;
+  /** Tables of `srbf.light_profile.Profile`, by the names that lights have for them, and whether they are images. */
+  profiles?: Record<string, { file: string; projected: boolean }>;
 }
 
 /** viewer.json: `srbf/viewer/page_manifest.py`. */
@@ -100,7 +100,7 @@ export async function loadOne(facts: AssetFacts, progress: (done: number, what: 
   const { coverage: name } = asset.manifest;
   const coverage = name === undefined ? undefined : await readImage(facts.folder, name, counting);
   const table = (url: string) => fetched(counting, url).then(async (response) => decodeFloat(await response.arrayBuffer(), url));
-  const profiled = Object.entries(facts.profiles).map(async ([own, url]) => [own, new Profile(await table(url))] as const);
+  const profiled = Object.entries(facts.profiles ?? {}).map(async ([own, { file, projected }]) => [own, new Profile(await table(file), projected)] as const);
   const [profiles, direct] = await Promise.all([Promise.all(profiled), readDirect(asset, coverage, facts.folder, counting)]);
   if (direct) Object.assign(direct, await readLobes(asset, facts, counting, table));
   return { facts, asset, coverage, direct, profiles: new Map(profiles) };

@@ -1,7 +1,7 @@
 /** The controls beside the picture: a chip per light, and folders of settings. */
 import { GUI } from "three/addons/libs/lil-gui.module.min.js";
-import type { Triple } from "../src";
-import { areaState, type DirectionalState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, pointState, rounded, shiningOf, sphereState, spotState } from "./light_state";
+import type { Profile, Triple } from "../src";
+import { areaState, type DirectionalState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, type PointLightState, pointState, rounded, shiningOf, sphereState, spotState } from "./light_state";
 import type { AddedKind } from "./asset_lights";
 import type { Box } from "./ball_state";
 import type { Bounds } from "./receivers";
@@ -38,6 +38,10 @@ export interface PanelFacts {
   /** Where a new light goes; above the receivers unless given. */
   middle?: Triple;
   hasDirect: boolean;
+  /** Of suns that do not say their own, degrees. */
+  sunAngle: number;
+  /** What lights may be shaped by, by name. */
+  profiles: ReadonlyMap<string, Profile>;
   /** Names of all assets. */
   assets: string[];
   hasMesh: boolean;
@@ -63,6 +67,7 @@ export interface PanelFacts {
 const KINDS = { directional: "Directional", point: "Point", spot: "Spot", sphere: "Sphere", area: "Area", environment: "Environment" } as const satisfies Record<AddedKind, string>;
 
 const DAYLIGHT = 6500; // K: about white
+const WIDEST_SUN = 20; // degrees
 
 export class Panel {
   private gui: GUI | undefined;
@@ -198,7 +203,10 @@ export class Panel {
     folder.add(light, "intensity", 0, Math.max(10, 4 * light.intensity), 0.01).name("Intensity").onChange(this.relight);
     if (light.kind === "environment") folder.add(light, "file").name("File").disable();
     if (isPlaced(light)) this.placed(folder, light);
-    if (light.kind === "directional" && !this.facts.hasDisc) this.turned(folder, light);
+    if (light.kind === "directional") {
+      if (!this.facts.hasDisc) this.turned(folder, light);
+      if (this.facts.hasDirect) this.angle(folder, light);
+    }
     const remove = {
       remove: () => {
         this.state.lights.splice(this.state.selected, 1);
@@ -263,6 +271,43 @@ export class Panel {
     folder.add(proxy, "elevation", -89.9, 89.9, 0.1).name("Elevation (°)").onChange(this.relight);
   }
 
+  /** How wide a sun's disc is, which softens its shadows. */
+  private angle(folder: GUI, light: DirectionalState): void {
+    const { sunAngle } = this.facts;
+    const proxy = {
+      get angle() {
+        return light.angle ?? sunAngle;
+      },
+      set angle(value: number) {
+        light.angle = value;
+      },
+    };
+    folder.add(proxy, "angle", 0, Math.max(WIDEST_SUN, proxy.angle), 0.01).name("Angle (°)").onChange(this.relight);
+  }
+
+  /** What shapes a light, and how it is turned; images are for spots alone. */
+  private profile(folder: GUI, light: PointLightState): void {
+    const names = [...this.facts.profiles].flatMap(([name, { projected }]) => (projected && light.kind !== "spot" ? [] : [name]));
+    if (names.length === 0) return;
+    const proxy = {
+      get profile() {
+        return light.profile ?? "";
+      },
+      set profile(name: string) {
+        light.profile = name || undefined;
+      },
+      get turn() {
+        return light.roll ?? 0;
+      },
+      set turn(value: number) {
+        light.roll = value;
+      },
+    };
+    const chosen = () => this.actions.changed({ lights: true, panel: true });
+    folder.add(proxy, "profile", { None: "", ...Object.fromEntries(names.map((name) => [name, name])) }).name("Profile").onChange(chosen);
+    if (light.profile !== undefined) folder.add(proxy, "turn", -180, 180, 1).name("Turn of the profile (°)").onChange(this.relight);
+  }
+
   private placed(folder: GUI, light: PlacedState): void {
     const { center, radius } = this.facts.bounds;
     const step = 10 ** Math.floor(Math.log10(radius / 100));
@@ -288,20 +333,19 @@ export class Panel {
       folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
       folder.add(light, "radius", 0.0001, radius, 0.0001).name(light.kind === "sphere" ? "Least distance (m)" : "Radius (m)").onChange(this.relight);
     }
-    if (light.kind !== "area" && light.profile !== undefined) {
+    if (light.kind !== "area") this.profile(folder, light);
+    if (light.kind === "sphere") folder.add(light, "size", step, radius, step).name("Size (m)").onChange(this.relight);
+    if (light.kind === "spot" && this.facts.hasDirect) {
       const proxy = {
-        profile: light.profile,
-        get turn() {
-          return light.roll ?? 0;
+        get size() {
+          return light.size ?? 0;
         },
-        set turn(value: number) {
-          light.roll = value;
+        set size(value: number) {
+          light.size = value || undefined;
         },
       };
-      folder.add(proxy, "profile").name("Profile").disable();
-      folder.add(proxy, "turn", -180, 180, 1).name("Turn of the profile (°)").onChange(this.relight);
+      folder.add(proxy, "size", 0, radius, step).name("Size (m)").onChange(this.relight);
     }
-    if (light.kind === "sphere") folder.add(light, "size", step, radius, step).name("Size (m)").onChange(this.relight);
     if (isAimed(light)) {
       coordinates("Aim", () => light.target, (place) => (light.target = place));
       const target = { on: false };

@@ -1,6 +1,6 @@
 /**
  * Direct light of lights inside the scene by perspective shadow maps: six faces of a cube about a point light, one map of a narrow spot, several
- * cubes over a sphere or an area.
+ * of these over a sphere, a spot with a size or an area.
  */
 import type { WebGLRenderer, WebGLRenderTarget } from "three";
 import directFragment from "../../glsl/stages/direct_point.frag";
@@ -22,7 +22,7 @@ const COARSE = 512; // of one of several looks
 const GUARD = 3; // texels past a face's edge, for filtering across it
 const WIDEST = (60 * Math.PI) / 180; // half-angle of a spot that one map holds
 const GRID = 4; // looks per side of an area
-const SPHERE_LOOKS = 12;
+const [SPHERE_LOOKS, CONE_LOOKS] = [12, 32]; // of a sphere by a cube each, of a spot with a size by a map each
 const NEAREST = 1e-3; // meters: what is nearer casts no shadow
 const FACES: readonly (readonly [Triple, Triple, Triple])[] = [0, 1, 2].flatMap((axis) =>
   [1, -1].map((sign) => {
@@ -86,14 +86,17 @@ export class PointShadows {
       const places = steps.flatMap((s) => steps.map((t) => [0, 1, 2].map((k) => position[k] + s * u[k] + t * v[k]) as unknown as Triple));
       [uniforms.partAcross.value, uniforms.partUp.value] = [u, v].map((side) => side.map((x) => x / GRID));
       for (const place of places) this.cube(sum, { ...base, position: place, color: shared(color, places.length) }, COARSE, 1);
-    } else if (light.kind === "sphere") {
-      const places = looks(light.position, light.size);
+    } else if ("size" in light && light.size) {
+      const places = looks(light.position, light.size, light.kind === "spot" && light.outer <= WIDEST ? CONE_LOOKS : SPHERE_LOOKS);
+      uniforms.sphereLooks.value = places.length;
       uniforms.sphere.value = [...light.position.map((x, k) => x - this.center[k]), light.size];
       places.forEach((position, i) => {
         uniforms.sphereLook.value = i;
-        this.cube(sum, { ...light, kind: "point", position, color: shared(light.color, places.length) }, COARSE);
+        const color = shared(light.color, places.length);
+        if (light.kind === "spot") this.spot(sum, { ...light, position, color }, COARSE);
+        else this.cube(sum, { ...light, kind: "point", position, color }, COARSE);
       });
-    } else if (light.kind === "spot" && light.outer <= WIDEST) this.cone(sum, light);
+    } else if (light.kind === "spot") this.spot(sum, light, FINE);
     else this.cube(sum, light, FINE);
   }
 
@@ -104,10 +107,15 @@ export class PointShadows {
     });
   }
 
-  private cone(sum: WebGLRenderTarget, light: Extract<PunctualLight, { kind: "spot" }>): void {
+  /** One map of the cone, or a cube where it is wide. */
+  private spot(sum: WebGLRenderTarget, light: Extract<PunctualLight, { kind: "spot" }>, size: number): void {
+    if (light.outer > WIDEST) {
+      this.cube(sum, light, size);
+      return;
+    }
     const right = across(light.direction);
-    this.look(light, [right, cross(light.direction, right), light.direction], (Math.tan(light.outer) * FINE) / (FINE - 2 * GUARD), -1, 0);
-    this.fine.add(sum, light.color);
+    this.look(light, [right, cross(light.direction, right), light.direction], (Math.tan(light.outer) * size) / (size - 2 * GUARD), -1, 0);
+    (size === FINE ? this.fine : this.coarse).add(sum, light.color);
   }
 
   private look(light: PunctualLight, [right, up, ahead]: readonly [Triple, Triple, Triple], reach: number, face: number, lambertian: number): void {
@@ -128,12 +136,25 @@ export class PointShadows {
 
 const shared = (color: Triple, count: number) => color.map((x) => x / count) as unknown as Triple;
 
-/** Places evenly over a sphere, on a spiral. */
-function looks([x, y, z]: Triple, radius: number): Triple[] {
-  return Array.from({ length: SPHERE_LOOKS }, (_, i) => {
-    const height = 1 - (2 * i + 1) / SPHERE_LOOKS;
+/** Places in a sphere that fill its disc evenly from wherever it is seen. */
+function looks([x, y, z]: Triple, radius: number, count: number): Triple[] {
+  const golden = (Math.sqrt(5) - 1) / 2;
+  return Array.from({ length: count }, (_, i) => {
+    const away = radius * depth((0.5 + i * golden) % 1);
+    const height = 1 - (2 * i + 1) / count;
     const turn = i * Math.PI * (3 - Math.sqrt(5));
     const flat = Math.sqrt(1 - height * height);
-    return [x + radius * flat * Math.cos(turn), y + radius * flat * Math.sin(turn), z + radius * height];
+    return [x + away * flat * Math.cos(turn), y + away * flat * Math.sin(turn), z + away * height];
   });
+}
+
+/** The distance from the middle of a unit sphere within which `share` of a density of 1 / sqrt(1 - r^2) lies: its projection is even. */
+function depth(share: number): number {
+  let [low, high] = [0, Math.PI / 2];
+  for (let i = 0; i < 30; ++i) {
+    const angle = (low + high) / 2;
+    if (angle - Math.sin(angle) * Math.cos(angle) < (share * Math.PI) / 2) low = angle;
+    else high = angle;
+  }
+  return Math.sin(low);
 }

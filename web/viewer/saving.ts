@@ -40,7 +40,7 @@ function entry(light: LightState, designed: Designed): Record<string, unknown> {
 }
 
 function values(light: LightState, color: Triple): Record<string, unknown> {
-  if (light.kind === "directional") return { kind: "directional", direction: light.direction, color };
+  if (light.kind === "directional") return { kind: "directional", direction: light.direction, color, ...(light.angle === undefined ? {} : { angle: (light.angle * Math.PI) / 180 }) };
   if (light.kind === "environment") return { kind: "environment", file: light.file, color };
   if (light.kind === "named") return { kind: "named", name: light.name, color };
   if (light.kind === "area") {
@@ -53,7 +53,7 @@ function values(light: LightState, color: Triple): Record<string, unknown> {
   if (light.kind === "sphere") return { kind: "sphere", position, size: light.size, ...fade };
   if (light.kind === "point") return { kind: "point", position, ...fade };
   const [inner, outer] = [(light.inner * Math.PI) / 180, (light.outer * Math.PI) / 180];
-  return { kind: "spot", position, direction: aim(light), inner, outer, ...fade };
+  return { kind: "spot", position, direction: aim(light), inner, outer, ...(light.size ? { size: light.size } : {}), ...fade };
 }
 
 function download(name: string, blob: Blob): void {

@@ -17,7 +17,7 @@ export class SunShadows {
   private readonly frame = { across: { value: [0, 0, 0] }, up: { value: [0, 0, 0] }, toLight: { value: [0, 0, 0] }, low: { value: [0, 0] }, extent: { value: 1 } };
   private readonly maps: ShadowMaps;
 
-  /** `bounds`: points, xyz, that the maps must hold; `angle` of the sun's disc, rad. */
+  /** `bounds`: points, xyz, that the maps must hold; `angle` of the disc of suns that do not say their own, rad. */
   constructor(
     renderer: WebGLRenderer,
     lit: readonly LitTexels[],
@@ -31,7 +31,7 @@ export class SunShadows {
 
   /** Add the light of `sun`, in the asset's frame, to `sum`. */
   add(sum: WebGLRenderTarget, sun: DirectionalLight): void {
-    const suns = discDirections(sun.direction, this.angle);
+    const suns = discDirections(sun.direction, sun.angle ?? this.angle);
     for (const direction of suns) {
       this.look(direction);
       this.maps.add(sum, sun.color.map((value) => value / suns.length) as unknown as Triple);

@@ -3,7 +3,7 @@ import { NoToneMapping, WebGLRenderer } from "three";
 import { type Asset, type Light, lightDomainOf, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
-import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, profileNames, redesign } from "./asset_lights";
+import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, redesign } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
 import { firstBall, roomOf } from "./ball_state";
@@ -164,6 +164,8 @@ export class Viewer {
       kinds: kindsOf(this.subject.asset),
       middle: middleOf(this.subject.asset),
       hasDirect: this.subject.hasDirect,
+      sunAngle: (this.subject.asset.manifest.direct?.sun_angle ?? 0) * (180 / Math.PI),
+      profiles: this.subject.profiles,
       assets: this.loaded.facts.assets.map(({ name }) => name),
       hasMesh: this.stage.canShowMesh,
       hasScene: this.stage.canShowScene,
@@ -471,7 +473,7 @@ export class Viewer {
   /** Play the frames of a file from now on. */
   private frames(file: File): Promise<void> {
     return this.slowly(async () => {
-      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear", profileNames(this.subject.asset.manifest));
+      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear", [...this.subject.profiles.keys()]);
       this.panel.setFacts(this.panelFacts());
     });
   }
