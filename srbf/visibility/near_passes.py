@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float, Float32
+from srbf.arrays import Bool, Float, Float32
 from srbf.gl.deep_framebuffer import folded
 from srbf.gl.programs import Programs
 from srbf.lights import PointLight, triple
 from srbf.visibility.gl_resources import Resources, Target
-from srbf.visibility.near_sources import MOST, NearSources, lift_above
+from srbf.visibility.near_sources import MOST, NearReceivers, NearSources, lift_above
 from srbf.visibility.surfel_light import SurfelLight
 
 if TYPE_CHECKING:
@@ -53,6 +53,8 @@ class NearPasses:
         Places (m) and unit normals of each set.
     texture_size
         Most texels of a side.
+    by_rays
+        What says how much all receivers see of a cell, in their order; None: shadow cubes about the cells.
     """
 
     def __init__(
@@ -62,8 +64,10 @@ class NearPasses:
         places: Float32[ndarray, "C 3"],
         receivers: list[tuple[Float[ndarray, "_ 3"], Float[ndarray, "_ 3"]]],
         texture_size: int,
+        by_rays: NearReceivers | None = None,
     ) -> None:
-        self._programs, self._surfels, self._places = programs, surfels, places
+        self._programs, self._surfels, self._places, self._by_rays = programs, surfels, places, by_rays
+        self._counts = [len(own) for own, _ in receivers]
         resources = Resources(programs.context)
         programs.resources.callback(resources.close)
         self._lift = lift_above(np.concatenate([own for own, _ in receivers]))
@@ -121,13 +125,16 @@ class NearPasses:
         for cell in [cell for cell in cells if cell not in self._kept]:
             slot = len(self._kept) if len(self._kept) < self._slots else self._kept.popitem(last=False)[1]
             self._kept[cell] = slot
-            self._draw_seen(cell, slot)
+            self.drawn += 1
+            if self._by_rays is None:
+                self._draw_seen(cell, slot)
+            else:
+                self._write_seen(self._by_rays.seen([cell])[0], slot)
         return [self._kept[cell] for cell in cells]
 
     def _draw_seen(self, cell: int, slot: int) -> None:
         """What all receivers see of a cell, through the faces of a shadow cube about its place."""
         gl: Any = self._programs.context
-        self.drawn += 1
         for face in self._surfels.faces(PointLight(triple(self._places[cell]), falloff="inverse-square")):
             cube = {"position": face["pointLight.position"], "positionLow": face["pointLight.positionLow"]}
             for receivers in self._receivers:
@@ -139,3 +146,9 @@ class NearPasses:
                 gl.enable_only(gl.NOTHING)
                 units = {"receivers": 0, "normals": 1, "heights": 2, "lift": self._lift, "first": slot * receivers.rows}
                 self._programs.run("deep_framebuffer_seen.frag", {}, {**face, **cube, **units})
+
+    def _write_seen(self, seen: Bool[ndarray, " R"], slot: int) -> None:
+        """What all receivers see of a cell, as rays say."""
+        for receivers, own in zip(self._receivers, np.split(seen, np.cumsum(self._counts)[:-1]), strict=True):
+            image = folded(np.where(own, 255, 0).astype(np.uint8)[:, None])
+            receivers.seen[0].write(image.tobytes(), viewport=(0, slot * receivers.rows, *receivers.places.size), alignment=1)

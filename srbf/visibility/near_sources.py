@@ -80,7 +80,7 @@ class NearReceivers:
     def irradiance(self, near: NearSources) -> Float32[ndarray, "R 3"]:
         """What near sources lay on the receivers, (R, 3)."""
         sending = near.by_cell()
-        seen = self._seen([cell for cell, _, _ in sending])
+        seen = self.seen([cell for cell, _, _ in sending])
         found = np.zeros((len(self._points), 3), np.float32)
         rows = range(0, len(found), ROWS)
 
@@ -94,7 +94,7 @@ class NearReceivers:
             each(part, len(rows))
         return found
 
-    def _seen(self, cells: list[int]) -> list[Bool[ndarray, " R"]]:
+    def seen(self, cells: list[int]) -> list[Bool[ndarray, " R"]]:
         """Which receivers see each cell."""
         new = [cell for cell in cells if cell not in self._known]
         found: list[ndarray] = [np.zeros(0)] * len(new)

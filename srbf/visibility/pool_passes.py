@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float64
 from srbf.asset import Asset
-from srbf.errors import ImageError, InputError
+from srbf.errors import ImageError, InputError, MissingLibraryError
 from srbf.gl.context import Limits
 from srbf.gl.deep_framebuffer import LinkPasses, NearTextures, folded
 from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.lights import WHITE, EnvironmentLight, Light, PointLight, refuse_named
+from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.linked_light import LinkedLight, surfel_objects
 from srbf.visibility.near_cells import NearCells
 from srbf.visibility.near_passes import NearPasses
-from srbf.visibility.near_sources import NearPool
+from srbf.visibility.near_sources import NearPool, NearReceivers
 from srbf.visibility.packed_links import unpacked
+from srbf.visibility.received import occluders_of
 from srbf.visibility.surface_cells import Cells
 from srbf.visibility.surfel_light import SurfelLight
 
@@ -35,8 +37,11 @@ NEGLIGIBLE, MOST_TERMS = 1e-4, 64  # of all light, that a bounce adds and is the
 class PoolPasses(Passes):
     """Passes over a deep framebuffer. A light that has neither moved nor changed but in color costs one pass over the clusters.
 
-    `computed` counts the lights whose bounces were computed.
+    `by_rays`: shadow rays say what surfels see of lights, and receivers of bright surfels, as in numpy, where embreex is installed. Shadow
+    cubes do otherwise, whose edges are those of their texels. `computed` counts the lights whose bounces were computed.
     """
+
+    by_rays: ClassVar[bool] = True
 
     def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
         self._asset, self._programs, self._textures, self._limits = asset, programs, textures, limits
@@ -96,7 +101,8 @@ class PoolPasses(Passes):
         self._toward_lobes = pool[2:, :, :3].sum(axis=0)  # albedo, and what lobes see beyond it
         names, scene = asset.manifest["gather"].get("objects", ()), asset.required_scene()
         linked = LinkedLight(cells, scene, names, surfel_objects(pool, names))
-        self._surfels = SurfelLight(self._programs, cells, scene, by_rays=linked)
+        occluders = _occluders(scene) if self.by_rays else None
+        self._surfels = SurfelLight(self._programs, cells, scene, by_rays=linked, cubes=occluders is None)
         self._links = LinkPasses(asset, self._programs, self._textures, terms)
         self._sums = [self._programs.target(self._links.cluster_size) for _ in range(2)]  # the first has the sum
         self._near: NearPasses | None = None
@@ -104,7 +110,9 @@ class PoolPasses(Passes):
             places, normals = asset.tables["view_points"]
             near = NearCells.of_asset(asset)
             sets = [(cells.places, cells.normals), (places, normals)]
-            self._near = NearPasses(self._programs, self._surfels, near.places, sets, self._limits.texture_size)
+            points, facing = (np.concatenate(own) for own in zip(*sets, strict=True))
+            seeing = None if occluders is None else NearReceivers(points, facing, near, occluders)
+            self._near = NearPasses(self._programs, self._surfels, near.places, sets, self._limits.texture_size, seeing)
             self._pool = NearPool(cells, near)
             size = self._surfels.texture.size
             self._far, self._second, self._taken = (self._programs.target(size) for _ in range(3))
@@ -136,6 +144,14 @@ class PoolPasses(Passes):
         self._near_clusters[1].clear()
         passes.draw(near, [self._second[1], self._near_clusters[1]])
         return self._far[0], NearTextures(self._second[0], self._taken[0], self._near_clusters[0])
+
+
+def _occluders(scene: bytes) -> EmbreeTriangles | None:
+    """What rays are shot at; None without embreex."""
+    try:
+        return occluders_of(scene)
+    except MissingLibraryError:
+        return None
 
 
 def bounce_terms(asset: Asset, cells: Cells) -> int:

@@ -1,4 +1,4 @@
-"""What a light lays on the cells of a scene's surfaces, by passes of the GPU: a cube of shadow maps about each point of the light."""
+"""What a light lays on the cells of a scene's surfaces, as a texture: by cubes of shadow maps about points of the light, or by rays."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MARGIN = 1.5  # times its width: surfels that the cone ends in have their middle
 class SurfelLight:
     """Direct irradiance on cells as a texture of one texel per cell: the GPU's `srbf.visibility.received.ReceivedLight`.
 
-    Point, spot, sphere and area lights by shadow maps; directional and environment lights, and those that choose objects, by rays.
+    Point, spot, sphere and area lights by shadow maps, where `cubes` says so; all others, and those that choose objects, by rays.
 
     Parameters
     ----------
@@ -47,10 +47,14 @@ class SurfelLight:
         Texels per side of a face of the shadow cube.
     by_rays
         What measures lights without a cube; None: rays that know no objects.
+    cubes
+        Whether lights have shadow cubes.
     """
 
-    def __init__(self, programs: Programs, cells: Cells, scene: bytes, size: int = FACE, by_rays: LinkedLight | None = None) -> None:
-        self._programs = programs
+    def __init__(
+        self, programs: Programs, cells: Cells, scene: bytes, size: int = FACE, by_rays: LinkedLight | None = None, cubes: bool = True
+    ) -> None:
+        self._programs, self._cubes = programs, cubes
         self._resources = Resources(programs.context)
         programs.resources.callback(self._resources.close)
         places = cells.places.astype(np.float64)
@@ -69,7 +73,7 @@ class SurfelLight:
 
         MissingLibraryError for directional and environment lights without embreex.
         """
-        if not isinstance(light, (PointLight, AreaLight)) or choices_of(light):
+        if not self._cubes or not isinstance(light, (PointLight, AreaLight)) or choices_of(light):
             return self._traced(light)
         gl: Any = self._programs.context
         self._target.use()
