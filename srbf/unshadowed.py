@@ -68,20 +68,25 @@ def area_irradiance(light: AreaLight, points: Float64[ndarray, "n 3"], normals: 
     """
     u, v = np.array(light.u), np.array(light.v)
     corners = np.array(light.position) + np.array([-u - v, v - u, u + v, u - v]) / 2  # clockwise as seen from the lit side
-    vertex = corners - points[:, None]  # (n, 4, 3)
-    height = np.einsum("nkc,nc->nk", vertex, normals)
-    total, leaving, entering = np.zeros(len(points)), np.zeros((len(points), 3)), np.zeros((len(points), 3))
+    upward = np.ascontiguousarray(normals.T)  # coordinate by coordinate, which is several times as fast
+    vertex = corners[:, :, None] - np.ascontiguousarray(points.T)  # (4, 3, n)
+    height = np.einsum("kcn,cn->kn", vertex, upward)
+    total = np.zeros(len(points))
+    leaving, entering = np.zeros((2, 3, len(points)))
     for i in range(4):
-        start, end = vertex[:, i], vertex[:, (i + 1) % 4]
-        first, second = height[:, i], height[:, (i + 1) % 4]
+        start, end = vertex[i], vertex[(i + 1) % 4]
+        first, second = height[i], height[(i + 1) % 4]
         crosses = (first > 0) != (second > 0)
+        if not crosses.any():
+            total += np.where(first > 0, _edge(start, end, upward), 0)
+            continue
         span = np.where(crosses, first - second, 1)
-        middle = start + (np.where(crosses, first, 0) / span)[:, None] * (end - start)  # where the edge meets the horizon
+        middle = start + np.where(crosses, first, 0) / span * (end - start)  # where the edge meets the horizon
         down, up = crosses & (first > 0), crosses & (second > 0)
-        leaving[down], entering[up] = middle[down], middle[up]
-        part = _edge(np.where(up[:, None], middle, start), np.where(down[:, None], middle, end), normals)
+        leaving[:, down], entering[:, up] = middle[:, down], middle[:, up]
+        part = _edge(np.where(up, middle, start), np.where(down, middle, end), upward)
         total += np.where((first > 0) | (second > 0), part, 0)
-    total += _edge(leaving, entering, normals)  # along the horizon, where the light crosses it
+    total += _edge(leaving, entering, upward)  # along the horizon, where the light crosses it
     front = (points - np.array(light.position)) @ np.array(light.direction) > 0
     return np.where(front, np.maximum(total, 0), 0) * (light.a0**2 / (2 * light.area))
 
@@ -101,9 +106,9 @@ def sphere_cosine(cosine: Float64[ndarray, " n"], sine: Float64[ndarray, " n"]) 
     return np.where(cut, partly, np.maximum(cosine, 0))
 
 
-def _edge(start: Float64[ndarray, "n 3"], end: Float64[ndarray, "n 3"], normals: Float64[ndarray, "n 3"]) -> Float64[ndarray, " n"]:
+def _edge(start: Float64[ndarray, "3 n"], end: Float64[ndarray, "3 n"], normals: Float64[ndarray, "3 n"]) -> Float64[ndarray, " n"]:
     """The angle between two vectors times the cosine between the normal and their plane's."""
-    cross = np.cross(start, end)
-    sine = np.linalg.norm(cross, axis=1)
-    angle = np.arctan2(sine, np.einsum("nc,nc->n", start, end))
-    return np.einsum("nc,nc->n", cross, normals) * angle / np.maximum(sine, 1e-30)
+    cross = np.cross(start, end, axis=0)
+    sine = np.sqrt(np.einsum("cn,cn->n", cross, cross))
+    angle = np.arctan2(sine, np.einsum("cn,cn->n", start, end))
+    return np.einsum("cn,cn->n", cross, normals) * angle / np.maximum(sine, 1e-30)

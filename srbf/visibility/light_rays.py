@@ -13,6 +13,7 @@ from srbf.light_geometry import attenuation, light_vectors, points_on, spot_cone
 from srbf.lights import AreaLight, DirectionalLight, PointLight, SphereLight, SpotLight, has_size, radius_of
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.receivers import disc_points
+from srbf.visibility.vectors import largest, lengths
 
 SHORT_OF_LIGHT = 1e-4  # m, plus this share of the distance from the origin: rays end before the surface that glows
 MIN_IMPORTANCE = 1e-6  # of samples whose point of the light is below their horizon
@@ -53,7 +54,7 @@ def rays_towards(
     """
     if isinstance(light, AreaLight):
         vector = points_on(light, square()) - point
-        distance = np.linalg.norm(vector, axis=1)
+        distance = lengths(vector)
         unit = vector / np.maximum(distance, 1e-30)[:, None]
         added = np.maximum(-(unit @ np.array(light.direction)), 0) * _cosine(unit, normal) * light.a0**2 / np.maximum(distance, 1e-30) ** 2
         return _weighted(light, point, normal, unit, distance, added)
@@ -65,7 +66,7 @@ def rays_towards(
         return replace(rays, opening=cone[:, None] * light.factors(point - np.array(light.position)))
     if isinstance(light, PointLight):
         vector = np.array(light.position) - point
-        distance = np.linalg.norm(vector, axis=1)
+        distance = lengths(vector)
         unit = vector / np.maximum(distance, 1e-30)[:, None]
         opening = light.factors(-vector)
         if isinstance(light, SpotLight):
@@ -84,7 +85,7 @@ def _towards_sphere(
     """Directions spread evenly over the solid angle of a sphere; from inside of it, over the half in front of its center."""
     axis, strength = light_vectors(light, point)
     size = radius_of(light)
-    center = np.linalg.norm(np.array(light.position) - point, axis=1)
+    center = lengths(np.array(light.position) - point)
     sine = np.minimum(size / np.maximum(center, 1e-30), 1)
     lowest = np.sqrt(1 - sine**2)
     cosine = 1 - square[:, 0] * (1 - lowest)
@@ -103,7 +104,7 @@ def _weighted(
     """`added`: irradiance by the point of the light that each ray meets, if all of the light were as that point."""
     exact = irradiance_from(light, point, normal)
     importance = np.where(exact > 0, np.maximum(added / np.maximum(exact, 1e-300), MIN_IMPORTANCE), 1)
-    short = SHORT_OF_LIGHT * (1 + np.abs(point).max(axis=1, initial=0))
+    short = SHORT_OF_LIGHT * (1 + largest(point))
     opening = light.factors(point - np.array(light.position)) if isinstance(light, PointLight) else np.ones((len(point), 3))
     return LightRays(unit, np.maximum(distance - short, 0), exact, opening, importance)
 
@@ -115,6 +116,6 @@ def _cosine(unit: ndarray, normal: ndarray) -> Float64[ndarray, " n"]:
 def _turned(axis: Float64[ndarray, "n 3"], offset: Float64[ndarray, "n 2"]) -> Float64[ndarray, "n 3"]:
     """Unit vectors along axis + offset in the plane across it."""
     across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-30)
+    across /= np.maximum(lengths(across), 1e-30)[:, None]
     unit = axis + offset[:, :1] * across + offset[:, 1:] * np.cross(axis, across)
-    return unit / np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-30)
+    return unit / np.maximum(lengths(unit), 1e-30)[:, None]

@@ -29,6 +29,7 @@ from srbf.visibility.shadow import rounded_share
 from srbf.visibility.shadow_rays import RAY_OFFSET, ShadowRays
 from srbf.visibility.surface import surface_at
 from srbf.visibility.texel_sums import TexelSums
+from srbf.visibility.vectors import largest, lengths
 
 FIRST_SAMPLES = 4  # of every texel
 FIRST_IN_VIEW, FINE_VIEW = 16, 1 << 18  # of every pixel, where shadows of thin things fall between few; of views of at most so many pixels
@@ -221,7 +222,7 @@ class RayTracer:
         point, face = samples.point[chosen], samples.face[chosen]
         NoL, NgL = (np.einsum("nc,nc->n", normal, direction) for normal in (samples.normal[chosen], face))
         origin = point + samples.lift[chosen] * rounded_share(NoL, NgL)[:, None]
-        offset = np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + np.abs(point).max(axis=1, initial=0))
+        offset = np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + largest(point))
         return (origin + face * offset[:, None]).astype(np.float32)
 
     def _scale(self, light: CastingLight) -> Float64[ndarray, " P"] | None:
@@ -265,7 +266,7 @@ class RayTracer:
         rays = rays_towards(light, samples.point, samples.normal, self._receivers.sun_angle, square)
         NoL = np.einsum("nc,nc->n", samples.normal, rays.direction)
         visible = (rays.opening * self.lit(samples, light)[:, None]).astype(np.float32)
-        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (visible > 0).any(axis=1))
+        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (largest(visible) > 0))
         distance = None if rays.distance is None else rays.distance[lit]
         visible[lit] *= self.reaching(samples, lit, rays.direction[lit].astype(np.float32), distance, light.blockers)
         sums.add(samples.texel, len(numbers), samples.share, rays.importance, visible, rays.irradiance)
@@ -286,7 +287,8 @@ class RayTracer:
         return Samples(texel, found.weight, found.point, found.normal, found.face, found.lift, found.weight[:, None], found.triangle)
 
     def _seen(self, texel: np.ndarray, square: np.ndarray) -> Samples:
-        origin, direction = self._looks(texel, square)
+        offset = self._offsets(square)
+        origin, direction = self._looks(texel, offset)
         hit, far, bary = self._all.first_hit(origin, direction)
         real = hit >= 0
         triangle = np.where(real, hit, 0)
@@ -298,7 +300,7 @@ class RayTracer:
         normal = normal * away
         if self._bumps is not None:
             smooth, bump = self._bumps
-            turned = normal + self._bump_at(bump, texel, square) * (np.einsum("nc,nc->n", normal, smooth[texel]) > SAME_NORMAL)[:, None]
+            turned = normal + self._bump_at(bump, texel, offset) * (np.einsum("nc,nc->n", normal, smooth[texel]) > SAME_NORMAL)[:, None]
             normal = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-20)
         weight = real.astype(np.float32)
         share = weight[:, None]
@@ -312,7 +314,7 @@ class RayTracer:
         seen = self._receivers.images["normal"].reshape(-1, 3)[self._texels]
         same = (centers.weight > 0) & (np.einsum("nc,nc->n", seen, centers.normal) > LEAST_BUMP_COS)
         position = self._receivers.images["position"].reshape(-1, 3)[self._texels]
-        origin, _ = self._looks(self._texels, np.full((len(self._texels), 2), 0.5))
+        origin, _ = self._looks(self._texels, np.zeros((len(self._texels), 2)))
         far = np.linalg.norm(position - centers.point, axis=1) > SAME_PLACE * np.linalg.norm(position - origin, axis=1)
         change = np.where((same & ~far)[:, None], seen - centers.normal, 0)
         if np.abs(change).max(initial=0) < LEAST_BUMP:
@@ -321,25 +323,28 @@ class RayTracer:
         smooth[self._texels], bump[self._texels] = centers.normal, change
         return smooth, bump
 
-    def _bump_at(self, bump: Float32[ndarray, "P 3"], texel: np.ndarray, square: np.ndarray) -> Float32[ndarray, "n 3"]:
+    def _offsets(self, square: np.ndarray) -> Float64[ndarray, "n 2"]:
+        """Places of the unit square as offsets from the centers of pixels, in pixels."""
+        camera = self._receivers.camera
+        assert camera is not None
+        return pixel_filter(camera["filter"], camera["filter_width"], square)
+
+    def _bump_at(self, bump: Float32[ndarray, "P 3"], texel: np.ndarray, offset: np.ndarray) -> Float32[ndarray, "n 3"]:
         """Between the centers of pixels, by linear interpolation."""
         from scipy.ndimage import map_coordinates
 
-        camera, height, width = self._receivers.camera, self._receivers.height, self._receivers.width
-        assert camera is not None
-        offset = pixel_filter(camera["filter"], camera["filter_width"], square)
+        height, width = self._receivers.height, self._receivers.width
         place = np.stack([texel // width + offset[:, 1], texel % width + offset[:, 0]])
         planes = bump.reshape(height, width, 3).transpose(2, 0, 1)
         return np.stack([map_coordinates(plane, place, order=1, mode="nearest") for plane in planes], axis=1)
 
-    def _looks(self, texel: np.ndarray, square: np.ndarray) -> tuple[Float32[ndarray, "n 3"], Float32[ndarray, "n 3"]]:
-        """Camera rays: origin (m) and unit direction."""
+    def _looks(self, texel: np.ndarray, offset: np.ndarray) -> tuple[Float32[ndarray, "n 3"], Float32[ndarray, "n 3"]]:
+        """Camera rays through offsets from the centers of pixels: origin (m) and unit direction."""
         camera = self._receivers.camera
         assert camera is not None
-        offset = pixel_filter(camera["filter"], camera["filter_width"], square)
         u = (texel % self._receivers.width + 0.5 + offset[:, 0]) / self._receivers.width
         v = (texel // self._receivers.width + 0.5 + offset[:, 1]) / self._receivers.height
-        matrix, frame = np.array(camera["matrix_world"]), np.array(camera["frame"])
+        matrix, frame = np.array(camera["matrix_world"], np.float64), np.array(camera["frame"], np.float64)
         top_right, _, bottom_left, top_left = frame
         aim = top_left + u[:, None] * (top_right - top_left) + v[:, None] * (bottom_left - top_left)
         if camera["type"] == "PERSP":
@@ -348,7 +353,7 @@ class RayTracer:
         else:
             origin = (aim * [1, 1, 0]) @ matrix[:3, :3].T + matrix[:3, 3]
             direction = np.broadcast_to(-matrix[:3, 2], aim.shape)
-        direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+        direction = direction / lengths(direction)[:, None]
         return origin.astype(np.float32), direction.astype(np.float32)
 
     def _materials_of_pixels(self) -> MaterialAlbedo:
@@ -376,7 +381,7 @@ class RayTracer:
 
     def _shown(self, texels: Int[ndarray, " e"], numbers: range) -> Int[ndarray, "s e"]:
         """The materials that samples of pixels hit, -1 for none."""
-        hit, _, _ = self._all.first_hit(*self._looks(np.tile(texels, len(numbers)), self._squares(texels, numbers)))
+        hit, _, _ = self._all.first_hit(*self._looks(np.tile(texels, len(numbers)), self._offsets(self._squares(texels, numbers))))
         return np.where(hit >= 0, self._receivers.triangles.material[np.maximum(hit, 0)], -1).reshape(len(numbers), -1)
 
 

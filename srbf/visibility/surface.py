@@ -7,6 +7,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float64, Int
 from srbf.io.scene_glb import Triangles
+from srbf.visibility.vectors import lengths
 
 SMOOTH_COS = 1 - 1e-6  # corner normals closer than that to the face normal belong to a flat face
 
@@ -21,10 +22,10 @@ def surface_at(
     """
     corners, normals = triangles.corners[triangle].astype(np.float64), triangles.normals[triangle].astype(np.float64)
     face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
+    face /= np.maximum(lengths(face), 1e-30)[:, None]
     face *= np.where(np.einsum("nc,nc->n", face, normals.sum(axis=1)) < 0, -1, 1)[:, None]
     mean = np.einsum("nk,nkc->nc", bary, normals)
-    normal = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-20)
+    normal = mean / np.maximum(lengths(mean), 1e-20)[:, None]
     bent = ~(np.einsum("nkc,nc->nk", normals, face) > SMOOTH_COS).all(axis=1)
     lift = np.zeros_like(mean)
     lift[bent] = mean[bent] * _rounding(corners[bent], normals[bent], bary[bent])[:, None]

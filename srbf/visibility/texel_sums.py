@@ -8,6 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
+from srbf.visibility.vectors import largest
 
 REFINE_STEP = 0.005  # over the usual irradiance: between samples of one texel, or between neighbors, from which it is refined
 NEIGHBOR_STEP = 0.05  # between neighbors: a shadow edge may cross a corner without samples
@@ -90,7 +91,7 @@ class TexelSums:
             count(self.seen, weight * visible)
         if self.sized:
             count(self.weight, weight)
-        real = (weight.max(axis=1) > COUNTS)[:, None]
+        real = (largest(weight) > COUNTS)[:, None]
         measured = visible if self.sized else light
         self.low[texels] = np.minimum(self.low[texels], by_sample(np.where(real, measured, np.float32(np.inf))).min(axis=0))
         self.high[texels] = np.maximum(self.high[texels], by_sample(np.where(real, measured, np.float32(0))).max(axis=0))
