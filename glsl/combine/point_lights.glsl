@@ -4,7 +4,8 @@
                                  vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K],
                                  vec4 directions[SRBF_POINT_LIGHTS], vec4 colors[SRBF_POINT_LIGHTS], int shining)
    domain: weights, scale, bias as in srbfCombineDirectional, weights 0 where no directional or environment light shines; level: of mip
-           maps, 0 without; centers as srbfCenterWeight takes them; directions, colors, shining from srbfPointLightsAt; result signed
+           maps, 0 without; centers as srbfCenterWeight takes them; directions, colors, shining from srbfPointLightsAt, all of them with
+           SRBF_UNROLLED; result signed
    twin:   srbf.methods.linear_response
    cite:   Wong2005, fig. 6 and 8 */
 #include "combine/center_weight.glsl"
@@ -23,7 +24,11 @@ vec3 srbfCombinePointLights(highp sampler2DArray maps, vec2 uv, float level, int
     vec3 sum = vec3(0.0);
     for (int i = 0; i < SRBF_K; ++i) {
         vec3 weight = weights[i].rgb;
+#ifdef SRBF_UNROLLED
+        for (int j = 0; j < SRBF_POINT_LIGHTS; ++j) {
+#else
         for (int j = 0; j < shining; ++j) {
+#endif
             weight += colors[j].rgb * srbfCenterWeight(rTable, directions[j].xyz, centers[i]);
         }
         vec3 stored = textureLod(maps, vec3(uv, float(firstMap + i)), level).rgb;

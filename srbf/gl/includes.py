@@ -18,6 +18,7 @@ _INCLUDE = re.compile(r'^\s*#\s*include\b\s*(?:"([^"]+)")?')
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 # 0:12(3) Mesa; 0(12) NVIDIA; 0:12 Intel, AMD, ANGLE, glslang, each with or without "ERROR: " before it
 _LOG_PLACE = re.compile(r"^(\s*(?:ERROR|WARNING|error|warning)?:?\s*)(\d+)(?::(\d+)(?:\(\d+\))?|\((\d+)\))", re.MULTILINE)
+Defines = Mapping[str, object]  # names to what follows them on their line
 # Lines of file n count from n * STRIDE: Mesa reports some errors (undeclared names) with source string 0 whatever #line said.
 STRIDE = 4096
 

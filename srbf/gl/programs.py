@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from srbf.gl.context import compile_program
-from srbf.gl.includes import resolve
+from srbf.gl.includes import Defines, resolve
 
 if TYPE_CHECKING:
     import moderngl
@@ -20,11 +20,11 @@ class Programs:
 
     def __init__(self, context: moderngl.Context, resources: ExitStack) -> None:
         self.context, self.resources = context, resources
-        self._made: dict[tuple[str, tuple[tuple[str, int], ...]], moderngl.VertexArray] = {}
+        self._made: dict[tuple[str, tuple[tuple[str, object], ...]], moderngl.VertexArray] = {}
         self._corners = context.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32))
         resources.callback(self._corners.release)
 
-    def run(self, stage: str, defines: dict[str, int], uniforms: dict[str, Any]) -> None:
+    def run(self, stage: str, defines: Defines, uniforms: dict[str, Any]) -> None:
         """Draw one stage over the whole of the target in use."""
         key = (stage, tuple(defines.items()))
         if key not in self._made:

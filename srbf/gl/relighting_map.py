@@ -10,8 +10,10 @@ from numpy import ndarray
 
 from srbf.arrays import Float64
 from srbf.asset import Asset
+from srbf.basis.gaussian import TABLE_TOLERANCE, weight_curve
 from srbf.errors import InputError
 from srbf.gl.context import Limits
+from srbf.gl.includes import Defines
 from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     import moderngl
 
 VECTORS_PER_MAP = 4  # weight, center, scale, bias
+CURVE_ERROR = TABLE_TOLERANCE / 4  # of R, up to which a curve stands for it: with wide spreads the formula does
 
 
 class MapPasses(Passes):
@@ -40,9 +43,19 @@ class MapPasses(Passes):
         self._scale, self._bias = padded(asset.scale), padded(asset.bias)
         self._free = vectors_free(limits)
         self._point_lights = point_lights_per_pass(self._free, VECTORS_PER_MAP)
-        self._formula = formula
-        self._defines = {"SRBF_PLAIN": 1} if textures.plain() else {}
-        self._functions = {"SRBF_FORMULA": 1} if formula else {"SRBF_PAIRS": 1} | ({"SRBF_SAMPLED": 1} if limits.software else {})
+        self._defines: Defines = {"SRBF_PLAIN": 1} if textures.plain() else {}
+        self._functions: Defines = self._formula() if formula else {"SRBF_PAIRS": 1} | ({"SRBF_SAMPLED": 1} if limits.software else {})
+        self._loops = {} if limits.software else {"SRBF_UNROLLED": 1}  # software skips lights that do not shine on a receiver
+
+    def _formula(self) -> Defines:
+        """R without the table: by the curve of the spread, or where it has none that is as good, by its own formula."""
+        if self._asset.manifest["basis"]["kind"] != "gaussian":
+            return {}
+        curve = weight_curve(self._asset.basis.spread)
+        if curve.error > CURVE_ERROR:
+            return {"SRBF_FORMULA": 1}
+        *first, last = (f"{coefficient:.9e}" for coefficient in curve.coefficients)
+        return {"SRBF_CURVE": f"vec4({', '.join(first)}), {last}"}
 
     def check_point_lights(self) -> None:
         """InputError where the shaders have no formula for the functions of a point light's direction."""
@@ -80,7 +93,7 @@ class MapPasses(Passes):
         where, values = self._textures.receivers(1)
         self._textures.r_pairs().use(2)
         centers = padded(self._asset.basis.centers)
-        if self._formula:
+        if "SRBF_FORMULA" in self._functions:
             centers[:, 3] = 0.5 / self._asset.basis.spread**2
         values |= {"maps": 0, "rTable": 2}
         if len(lights) == 1 and not weights.any() and not where:
@@ -93,18 +106,18 @@ class MapPasses(Passes):
             arrays = {"centers": centers, "weights": far}
             self._over_maps(
                 "lights.frag",
-                {"SRBF_POINT_LIGHTS": places} | where | self._functions,
+                {"SRBF_POINT_LIGHTS": places, **where, **self._loops, **self._functions},
                 values,
                 arrays,
                 units or self.layers_per_pass(places),
             )
             far = np.zeros_like(far)
 
-    def _over_maps(self, stage: str, defines: dict[str, int], values: dict[str, Any], arrays: dict[str, ndarray], size: int) -> None:
-        defines = defines | self._defines
+    def _over_maps(self, stage: str, defines: Defines, values: dict[str, Any], arrays: dict[str, ndarray], size: int) -> None:
+        defines = {**defines, **self._defines}
         for first, count in ranges(self._asset.k, size):
             own = {name: array[first : first + count] for name, array in arrays.items()} | self._decoding(first, count)
-            self._programs.run(stage, {"SRBF_K": count} | defines, values | {"firstMap": first} | own)
+            self._programs.run(stage, {"SRBF_K": count, **defines}, values | {"firstMap": first} | own)
 
     def _accumulate(self, weights: Float64[ndarray, "K 3"], units: int) -> None:
         for first, count in ranges(self._asset.k, units):

@@ -12,7 +12,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset, layer_entries
 from srbf.asset_reader import AssetReader
-from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of, weight
+from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of, weight, weight_curve
 from srbf.basis.harmonics import HARMONICS, HarmonicKind, PolynomialTextureMap, SphericalHarmonics
 from srbf.capture import Capture
 from srbf.compute.threads import each
@@ -207,7 +207,9 @@ class RelightingMap(Method):
         tables = {}
         if isinstance(basis, GaussianBasis):
             tables["r_table"] = r_table(basis.spread)
+            curve = weight_curve(basis.spread)
             manifest["basis"] = {"kind": "gaussian", "centers": basis.centers.tolist(), "spread": basis.spread}
+            manifest["basis"]["curve"] = {"coefficients": curve.coefficients.tolist(), "error": curve.error}
             manifest["r_table"] = {"file": "r_table.exr", "size": len(tables["r_table"])}
         else:
             manifest["basis"] = {"kind": self.basis}

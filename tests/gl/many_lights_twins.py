@@ -45,6 +45,21 @@ def _(evaluate: Evaluate) -> None:
         assert near.sum() > 20 and (np.abs(found[near] - 1) <= 1.1e-7 / spread**2 + UNIT).all()
 
 
+@twin("basis/weight_curve.glsl")
+def _(evaluate: Evaluate) -> None:
+    """As numpy has it, and as near to R as it says."""
+    versine = np.concatenate([np.linspace(-0.1, 2.1, 500), np.geomspace(1e-12, 1e-2, 60), [0, 1, 2]]).astype(np.float32)
+    for spread in (0.05, 0.12, 0.3, 0.45, 0.6, 1.0):
+        curve = gaussian.weight_curve(spread)
+        *first, last = (f"{coefficient:.9e}" for coefficient in curve.coefficients)
+        code = f"vec4(srbfWeightCurve(a.x, vec4({', '.join(first)}), {last}))"
+        found = evaluate("basis/weight_curve.glsl", code, vec4(versine))[:, 0]
+        np.testing.assert_allclose(found, curve.evaluate(versine), atol=16 * UNIT)
+        exact = gaussian.weight(1 - np.clip(versine.astype(float), 0, 2), spread)
+        assert np.abs(curve.evaluate(versine) - exact).max() <= 1.01 * curve.error + 1e-9
+        assert curve.error < (1e-6 if spread < 0.4 else 5e-6 if spread < 0.5 else 1e-4 if spread < 0.7 else 5e-3)
+
+
 @twin("basis/weight_pairs.glsl")
 def _(evaluate: Evaluate) -> None:
     for spread in (0.12, 0.45, 1.0):

@@ -141,6 +141,21 @@ def test_many_point_lights_at_once_equal_numpy(relighter_of: Callable[..., Any],
     assert (np.abs(relighter.relight(lights, multipass=True) - found) <= 2 * tolerance(asset, lights)).all()
 
 
+@pytest.mark.parametrize("functions", ["table", "formula"])
+def test_loops_of_gpus_give_what_those_of_software_do(context: Any, make_asset: Callable[..., Asset], functions: Any) -> None:
+    """A light keeps its place in them, whether it shines on a receiver or not."""
+    asset = make_asset(25, "half")
+    lights = [*point_lights(3), SpotLight((0, 0, 2.0), direction=(0, 0, -1), inner=0.05, outer=0.1), *point_lights(2)]
+    counts = (1, 3, len(lights))
+    with Relighter(asset, context=context, functions=functions) as relighter:
+        passes: Any = relighter._passes
+        by_software = [relighter.relight(lights[:count]) for count in counts]
+        assert passes._loops == {}
+        passes._loops = {"SRBF_UNROLLED": 1}
+        for count, expected in zip(counts, by_software, strict=True):
+            assert (np.abs(relighter.relight(lights[:count]) - expected) <= tolerance(asset, lights[:count])).all()
+
+
 def test_point_lights_by_formula_are_as_near_as_the_table_is(context: Any, make_asset: Callable[..., Asset]) -> None:
     """numpy reads the table, which is within 2^-12 of the formula; a sharper truth is R itself."""
     asset = make_asset(25, "float")
