@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from light_set_commands import done, refused, scenes_in
 from made_profiles import picture
-from test_scene_lights import VIEW, each_by_cycles, relative
+from test_scene_lights import baked, each_by_cycles, relative
 
 from srbf.asset import Asset
 from srbf.bake.given_reference import render_given
@@ -51,8 +51,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def shot(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("shot")
-    done("bake", scene, "-o", folder / "capture", *VIEW)
-    done("fit", folder / "capture", "-o", folder / "asset")
+    baked(scene, folder)
     return folder
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from light_set_commands import done, refused, scenes_in
-from test_scene_lights import VIEW, by_cycles, each_by_cycles, relative
+from test_scene_lights import baked, by_cycles, each_by_cycles, relative
 
 from srbf import relight
 from srbf.asset import Asset
@@ -35,8 +35,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def shot(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("shot")
-    done("bake", scene, "-o", folder / "capture", *VIEW)
-    done("fit", folder / "capture", "-o", folder / "asset")
+    baked(scene, folder)
     return folder
 
 

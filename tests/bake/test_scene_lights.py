@@ -44,9 +44,14 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 def shot(scene: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The folder of the capture and the asset of the designed room, and what the bake said."""
     folder = tmp_path_factory.mktemp("shot")
-    said = done("bake", scene("designed"), "-o", folder / "capture", *VIEW).stderr
+    return folder, baked(scene("designed"), folder)
+
+
+def baked(scene: Path, folder: Path) -> str:
+    """Bake a scene's view into the folder's `capture`, fit it into its `asset`; what the bake said."""
+    said = done("bake", scene, "-o", folder / "capture", *VIEW).stderr
     done("fit", folder / "capture", "-o", folder / "asset")
-    return folder, said
+    return said
 
 
 def each_by_cycles(scene: Path, names: Sequence[str], samples: int) -> list[np.ndarray]:

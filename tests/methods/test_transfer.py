@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from srbf.methods.surface_changes import Surfaces, emitted_by_objects, with_albe
 from srbf.methods.transfer import Transfer
 from srbf.relighting.direct_light import Added
 from srbf.solve.radiosity import Bounces, reciprocal
+from srbf.visibility import transfer_basis as transfer_basis_module
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.transfer_basis import exchange_of, grouped, training_light, transfer_basis
@@ -34,6 +36,15 @@ pytestmark = pytest.mark.slow
 BOX = Room.box((3, 2, 2), 0.25, 0.6)
 APART = Room.box((4, 3, 2.5), 0.25, 0.6, (2.0, 3.0, 3.0))  # a wall without a door
 SETTINGS = Transfer(clusters=8, components=12, rank=96, surfels=400)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_lights() -> Iterator[None]:
+    """A room of two colors needs fewer to make its shapes for."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, count in (("PLACED", 300), ("MOST_PLACED", 300), ("NEAR", 120), ("SPOTS", 120)):
+            patch.setattr(transfer_basis_module, name, count)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +103,7 @@ def test_lights_of_all_kinds_add_up_and_scale(asset: Asset) -> None:
 
 
 def test_two_rooms_without_a_door_exchange_no_light(tmp_path: Path) -> None:
-    apart = Transfer(clusters=16, rank=96, surfels=400).encode(room_of_surfels(tmp_path / "capture", APART, 1200))
+    apart = Transfer(clusters=16, rank=96, surfels=400).encode(room_of_surfels(tmp_path / "capture", APART, 700))
     far = (APART.places[:, 0] > 2) | ((np.abs(APART.places[:, 0] - 2) < 1e-6) & (APART.normals[:, 0] > 0))
     lit = linear_response(apart, [light((1.0, 1.5, 1.2))]).reshape(-1, 3)[: len(APART.places)]
     assert np.abs(lit[far]).mean() < 0.005 * lit[~far].mean()

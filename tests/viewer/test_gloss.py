@@ -177,6 +177,23 @@ def test_lobes_reflect_lights_with_a_size(chromium: Any, shaped: Asset, serve: C
     assert np.quantile(shown_as(diffuse + lobes) - shown_as(diffuse), 0.9) > 10
 
 
+def test_sizes_and_angles_are_set_and_saved(chromium: Any, shaped: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
+    """Of a spot, which is a point without a size, and of a sun, which has the asset's angle unless it has one."""
+    shaped.save(tmp_path / "asset")
+    spot = {"kind": "spot", **COMMON, **FADE, "position": INSIDE, "target": [1.4, 1.0, 0.0], "a0": 1.0, "inner": 30, "outer": 35}
+    sun = {"kind": "directional", **COMMON, "direction": [0.1, 0.2, 1.0]}
+    state = {"lights": [spot, sun], "selected": 0}
+    chromium("open", url=f"{serve(tmp_path / 'asset')}#{quote(json.dumps(state))}", width=WIDTH, height=HEIGHT)
+    ((before, far),) = lights_of(chromium, tmp_path)
+    assert isinstance(before, SpotLight) and before.size == 0 and isinstance(far, DirectionalLight) and far.angle is None
+    chromium("number", name="Size (m)", value=0.05)
+    chromium("press", keys=["2"])
+    chromium("number", name="Angle (°)", value=2)
+    ((soft, wide),) = lights_of(chromium, tmp_path)
+    assert isinstance(soft, SpotLight) and soft.size == 0.05 and soft.radius == 0.05
+    assert isinstance(wide, DirectionalLight) and wide.angle == pytest.approx(np.radians(2))
+
+
 @pytest.mark.parametrize("terms", ["indirect", "direct"])
 def test_a_profile_of_the_scene_shapes_light(chromium: Any, shaped: Asset, serve: Callable[..., str], tmp_path: Path, terms: str) -> None:
     """The scene's own lights, with their files; FRAMES.json names these, and `srbf relight` finds them in the asset."""
