@@ -49,9 +49,16 @@ class LightFunctions:
     def project(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
         """sum_n color_n w_f(direction_n): the total weights of many lights, or of the texels of an environment map."""
         projected = np.empty((len(self.spreads), 3))
-        for chosen, weights in self._by_spread(directions):
-            projected[chosen] = np.einsum("fbc,bc->fc", self.coefficients[chosen], weights.T @ colors, optimize=True)
+        for coefficients, (chosen, weights) in zip(self._by_color, self._by_spread(directions), strict=True):
+            for c, sums in enumerate((weights.T @ colors).T.astype(np.float32)):
+                projected[chosen, c] = sums @ coefficients[c]
         return projected
+
+    @cached_property
+    def _by_color(self) -> list[Float32[ndarray, "3 B f"]]:
+        """Coefficients of the functions of each spread, a center in a row: single precision and this order are several times as fast."""
+        groups = (self.coefficients[self.spreads == spread] for spread in np.unique(self.spreads))
+        return [np.ascontiguousarray(own.transpose(2, 1, 0)) for own in groups]
 
     def _by_spread(self, directions: Float[ndarray, "N 3"]) -> Iterator[tuple[Bool[ndarray, " F"], Float64[ndarray, "N B"] | csr_array]]:
         if len(self.centers) >= MANY_CENTERS and (self.spreads < NARROW).all():
