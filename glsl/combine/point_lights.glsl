@@ -22,13 +22,14 @@ vec3 srbfCombinePointLights(highp sampler2DArray maps, vec2 uv, float level, int
                       vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K],
                       vec4 directions[SRBF_POINT_LIGHTS], vec4 colors[SRBF_POINT_LIGHTS], int shining) {
     vec3 sum = vec3(0.0);
+#ifdef SRBF_UNROLLED
+    const int most = SRBF_POINT_LIGHTS;
+#else
+    int most = shining;
+#endif
     for (int i = 0; i < SRBF_K; ++i) {
         vec3 weight = weights[i].rgb;
-#ifdef SRBF_UNROLLED
-        for (int j = 0; j < SRBF_POINT_LIGHTS; ++j) {
-#else
-        for (int j = 0; j < shining; ++j) {
-#endif
+        for (int j = 0; j < most; ++j) {
             weight += colors[j].rgb * srbfCenterWeight(rTable, directions[j].xyz, centers[i]);
         }
         vec3 stored = textureLod(maps, vec3(uv, float(firstMap + i)), level).rgb;

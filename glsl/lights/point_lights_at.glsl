@@ -23,12 +23,13 @@ int srbfPointLightsAt(vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCou
         directions[j] = vec4(0.0);
         colors[j] = vec4(0.0);
     }
-    int shining = 0;
 #ifdef SRBF_UNROLLED
-    for (int j = 0; j < SRBF_POINT_LIGHTS; ++j) {
+    const int most = SRBF_POINT_LIGHTS;
 #else
-    for (int j = 0; j < min(pointLightCount, SRBF_POINT_LIGHTS); ++j) {
+    int most = min(pointLightCount, SRBF_POINT_LIGHTS);
 #endif
+    int shining = 0;
+    for (int j = 0; j < most; ++j) {
         SrbfPointLight pointLight = srbfUnpackPointLight(pointLights[4 * j], pointLights[4 * j + 1], pointLights[4 * j + 2], pointLights[4 * j + 3]);
         vec3 lightVector = srbfLightVector(pointLight.position, pointLight.positionLow, receiver);
         float strength = srbfPointLightStrength(pointLight, lightVector);

@@ -55,7 +55,7 @@ class MapPasses(Passes):
         if curve.error > CURVE_ERROR:
             return {"SRBF_FORMULA": 1}
         *first, last = (f"{coefficient:.9e}" for coefficient in curve.coefficients)
-        return {"SRBF_CURVE": f"vec4({', '.join(first)}), {last}"}
+        return {"SRBF_CURVE": f"vec4({', '.join(first)})", "SRBF_CURVE_LAST": last}
 
     def check_point_lights(self) -> None:
         """InputError where the shaders have no formula for the functions of a point light's direction."""

@@ -27,7 +27,15 @@ LIT_MAPS = [{"SRBF_K": k} | point_lights for k in (1, 25, 32) for point_lights i
     {"SRBF_K": 25, "SRBF_POINT_LIGHTS": 16, "SRBF_FORMULA": 1}
 ]
 LIT_MAPS += [{"SRBF_K": 25, "SRBF_POINT_LIGHTS": 16, "SRBF_PAIRS": 1, "SRBF_PLAIN": 1}]
-LIT_MAPS += [{"SRBF_K": 25, "SRBF_POINT_LIGHTS": 4, "SRBF_UNROLLED": 1, "SRBF_CURVE": "vec4(-7.12, -1.18, -0.356, -6.28e-3), -0.122"}]
+LIT_MAPS += [
+    {
+        "SRBF_K": 25,
+        "SRBF_POINT_LIGHTS": 4,
+        "SRBF_UNROLLED": 1,
+        "SRBF_CURVE": "vec4(-7.12, -1.18, -0.356, -6.28e-3)",
+        "SRBF_CURVE_LAST": -0.122,
+    }
+]
 LIT_PLANES = [{"SRBF_COMPONENTS": s} | point_lights for s in (9, 256) for point_lights in POINT_LIGHTS] + [
     {"SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4, "SRBF_PLAIN": 1}
 ]
