@@ -53,7 +53,7 @@ def draws_of(asset: Asset, context: Any, resources: ExitStack) -> dict[str, Call
     limits, programs = Limits.of(context), Programs(context, resources)
     textures = AssetTextures(context, asset, limits, resources)
     passes: Any = PoolPasses(asset, programs, textures, limits)
-    passes.by_rays = False  # the GPU alone
+    passes.shadow_rays = False  # the GPU alone
     light = free_light(asset)
     passes.prepare([light])
     surfels, links = passes._surfels, passes._links

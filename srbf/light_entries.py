@@ -61,10 +61,8 @@ def entry_of(light: Light) -> dict[str, Any]:
     if isinstance(light, PointLight):
         if light.profile is None:
             fields = {name: value for name, value in fields.items() if name not in OF_PROFILES or "inner" in fields and name == "direction"}
-        elif light.profile.file is None:
-            raise InputError("expected a profile that was read from a file, found another")
         else:
-            fields["profile"] = light.profile.file[0]
+            fields["profile"] = light.profile.name
     fields |= {link: choice.entry() for link, choice in choices_of(light).items()}
     kind = next((kind for kind, made in KINDS.items() if type(light) is made), "named")
     return {"kind": kind, **fields}

@@ -8,6 +8,7 @@ from numpy import ndarray
 from srbf.arrays import Float, Float32, Float64
 from srbf.lights import AreaLight, PointLight, SpotLight
 from srbf.sphere import Domain
+from srbf.vectors import lengths
 
 SPOT_SOFTNESS_MIN = 1e-6  # in cosine: an edge of inner = outer stays a step without dividing by zero
 GOLDEN = (5**0.5 - 1) / 2
@@ -89,25 +90,28 @@ def soft_cone(light: SpotLight, away: Float[ndarray, "n 3"], normals: Float[ndar
     0.5
     """
     edges, direction = (np.cos(light.inner), np.cos(light.outer)), np.array(light.direction)
-    distance = np.linalg.norm(away, axis=1)
+    distance = lengths(away)
     axis = away / np.maximum(distance, 1e-30)[:, None]
-    found = spot_cone(axis @ direction, *edges)
+    cosine = axis @ direction
+    found = spot_cone(cosine, *edges)
+    if light.size == 0:
+        return found
     sine = np.minimum(light.size / np.maximum(distance, 1e-30), 1)
-    off, reach = np.arccos(np.clip(axis @ direction, -1, 1)), np.arcsin(sine)
+    off, reach = np.arccos(np.clip(cosine, -1, 1)), np.arcsin(sine)
     crossed = np.flatnonzero((off + reach > light.inner) & (off - reach < light.outer) & (sine > 0))
     if not len(crossed):
         return found
     axis, lowest = axis[crossed], np.sqrt(1 - sine[crossed] ** 2)
     across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-30)
+    across /= np.maximum(lengths(across), 1e-30)[:, None]
     frame = np.stack([axis, across, np.cross(axis, across)], axis=1)
     along = frame @ direction
     facing = None if normals is None else -np.einsum("nfk,nk->nf", frame, normals[crossed])
     total, whole = np.zeros((2, len(axis)))
     for i in range(CONE_POINTS):
-        cosine = 1 - (i + 0.5) / CONE_POINTS * (1 - lowest)
-        radius, turn = np.sqrt(np.maximum(1 - cosine**2, 0)), 2 * np.pi * GOLDEN * i
-        part = np.stack([cosine, radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+        ahead = 1 - (i + 0.5) / CONE_POINTS * (1 - lowest)
+        radius, turn = np.sqrt(np.maximum(1 - ahead**2, 0)), 2 * np.pi * GOLDEN * i
+        part = np.stack([ahead, radius * np.cos(turn), radius * np.sin(turn)], axis=1)
         weight = np.ones(len(axis)) if facing is None else np.maximum(np.einsum("nf,nf->n", part, facing), 0)
         total += weight * spot_cone(np.einsum("nf,nf->n", part, along), *edges)
         whole += weight
@@ -140,7 +144,7 @@ def light_vectors(light: PointLight, positions: Float[ndarray, "*p 3"]) -> tuple
     ([[0.0, 0.0, 1.0]], [0.5])
     """
     vectors = np.array(light.position) - positions  # L = S - P, eq. 3
-    distance = np.linalg.norm(vectors, axis=-1)
+    distance = lengths(vectors)
     unit = vectors / np.maximum(distance, 1e-30)[..., None]
     strength = attenuation(distance, light)
     if isinstance(light, SpotLight):

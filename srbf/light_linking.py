@@ -41,17 +41,13 @@ class Objects:
     [True, False]
     """
 
-    only: tuple[str, ...] | None = None
-    without: tuple[str, ...] = ()
+    only: Sequence[str] | None = None  # tuples, once made
+    without: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        for field, names in (("only", self.only), ("without", self.without)):
-            if isinstance(names, str):
-                raise InputError(f"expected names of objects in `{field}`, found {names!r}; put it into a list")
-            object.__setattr__(self, field, None if names is None else tuple(names))
-        for name in self.named:
-            if not isinstance(name, str) or not name:
-                raise InputError(f"expected names of objects, found {name!r}")
+        if self.only is not None:
+            object.__setattr__(self, "only", _checked("only", self.only))
+        object.__setattr__(self, "without", _checked("without", self.without))
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -73,7 +69,7 @@ class Objects:
     def of_entry(entry: Mapping[str, Any]) -> Objects:
         """From {only, without}, either of which may be missing."""
         only = entry.get("only")
-        return Objects(None if only is None else tuple(only), tuple(entry.get("without", ())))
+        return Objects(None if only is None else _checked("only", only), _checked("without", entry.get("without", ())))
 
     def entry(self) -> dict[str, list[str]]:
         """{only, without}, as FRAMES.json has it."""
@@ -81,6 +77,16 @@ class Objects:
             **({} if self.only is None else {"only": list(self.only)}),
             **({"without": list(self.without)} if self.without else {}),
         }
+
+
+def _checked(field: str, names: Any) -> tuple[str, ...]:
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise InputError(f"expected names of objects in `{field}`, found {names!r}; put them into a list")
+    listed = tuple(names)
+    for name in listed:
+        if not isinstance(name, str) or not name:
+            raise InputError(f"expected names of objects in `{field}`, found {name!r}")
+    return listed
 
 
 def choices_of(light: object) -> dict[str, Objects]:

@@ -69,6 +69,13 @@ class Profile:
         table = parse_ies(content, name).table()
         return Profile(np.repeat(table[:, :, None], 3, axis=2), file=(name, content))
 
+    @property
+    def name(self) -> str:
+        """Of its file, by which lights name it; InputError where it was read from none."""
+        if self.file is None:
+            raise InputError("expected a profile that was read from a file, found another")
+        return self.file[0]
+
     @functools.cached_property
     def key(self) -> bytes:
         """Equal of profiles that are equal."""

@@ -416,7 +416,7 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
     >>> up = np.diag([2.0, 2.0, 2.0, 1.0])
     >>> up[2, 3] = 1.0
     >>> light = moved(PointLight((1.0, 0.0, 0.0), a0=1.0), up)
-    >>> light.position, light.a0
+    >>> light.position, round(light.a0, 6)
     ((2.0, 0.0, 1.0), 2.0)
     """
     linear = matrix[:3, :3]

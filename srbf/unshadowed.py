@@ -9,6 +9,7 @@ from srbf.arrays import Float, Float64
 from srbf.errors import InputError
 from srbf.light_geometry import light_vectors, soft_cone
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
+from srbf.vectors import lengths
 
 
 def irradiance_from(light: Light, points: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"]) -> Float64[ndarray, " n"]:
@@ -54,7 +55,7 @@ def irradiance_from(light: Light, points: Float[ndarray, "n 3"], normals: Float[
         toward, strength = light_vectors(light, points)
         cosine = np.einsum("nc,nc->n", toward, normals)
         if isinstance(light, SphereLight):
-            distance = np.linalg.norm(np.array(light.position) - points, axis=1)
+            distance = lengths(np.array(light.position) - points)
             return strength * sphere_cosine(cosine, np.minimum(light.size / np.maximum(distance, 1e-30), 1))
         return strength * np.maximum(cosine, 0)
     raise InputError(f"expected a light with a place or a direction, found {type(light).__name__}; leave it out")

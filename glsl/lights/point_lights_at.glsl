@@ -36,7 +36,7 @@ int srbfPointLightsAt(vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCou
 #ifdef SRBF_UNROLLED
         directions[j] = vec4(srbfLightDirection(lightVector), 0.0);
         colors[j] = j < pointLightCount ? vec4(pointLight.color * strength, 0.0) : vec4(0.0);
-        ++shining;
+        shining = most;
 #else
         if (strength > 0.0) {
             directions[shining] = vec4(srbfLightDirection(lightVector), 0.0);

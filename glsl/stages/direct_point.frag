@@ -36,7 +36,7 @@ uniform bool profiled;    // whether the light has a profile
 uniform vec3 profileAcross;
 uniform vec3 profileUp;
 uniform float profileTangent;
-uniform vec4 sphere;        // middle of a sphere, less the origin of the points, and its radius; radius 0 otherwise
+uniform vec4 sphere;      // middle of a sphere, or of a spot with a size, less the origin of the points, and its radius; radius 0 otherwise
 #ifdef SRBF_LOBES
 uniform sampler2D glossy;      // whole albedo of each texel's lobe
 uniform sampler2D lobes;       // its roughness, what share of it has a Fresnel term, above 0 where there is one
@@ -44,7 +44,7 @@ uniform sampler2D lobeAlbedo;  // as srbfLobeAlbedo takes it
 uniform vec4 eye;              // a place, less the same origin as the points, and 1; or the unit direction to it, and 0
 uniform vec3 partAcross;       // sides of the part of an area that the look stands for, meters; 0 otherwise
 uniform vec3 partUp;
-uniform int sphereLook;          // which of sphereLooks
+uniform int sphereLook;        // which of sphereLooks
 uniform int sphereLooks;
 #endif
 

@@ -52,11 +52,11 @@ preview's.
 {rows}
 
 *All of it* computes every light for the first time, by numpy, and is slower than the reference where many lights have a size: changes
-after that are what pays. Nearly all of that time is direct light by rays, without visible noise, of
-lights with a size; bounces take 0.1 to 0.4 s a light ([measurements.md](measurements.md)). The viewer does the same on a GPU, by shadow
-maps. Cycles' times are without opening the scene (two cores, no GPU). Errors are against the reference, whose own
-noise counts in both. For colors alone, Cycles' light groups are an alternative: they keep an image per group, and mixing adds no
-noise, but no light can move or change its cone; [measurements.md](measurements.md) compares them with `--light-set named`.
+after that are what pays. Nearly all of that time is direct light by rays, without visible noise, of lights with a size; bounces take
+0.4 to 0.9 CPU seconds a light ([measurements.md](measurements.md)). The viewer does the same on a GPU, by shadow maps. Cycles' times
+are without opening the scene (two cores, no GPU). Errors are against the reference, whose own noise counts in both. For colors alone,
+Cycles' light groups are an alternative: they keep an image per group, and mixing adds no noise, but no light can move or change its
+cone; [measurements.md](measurements.md) compares them with `--light-set named`.
 """
 
 

@@ -123,7 +123,7 @@ class WeightCurve:
 
 @functools.lru_cache(maxsize=64)
 def weight_curve(spread: float) -> WeightCurve:
-    """The curve of a spread (rad), whose largest error is least: least squares weighed again by the errors [Lawson1961].
+    """The curve of a spread (rad) with a small largest error: least squares, weighed again by the errors [Lawson1961].
 
     Within 3e-6 of R up to 0.45 rad, 1e-4 up to 0.65 rad, 5e-3 at 1 rad, where theta^2 is no polynomial at the far pole.
     """

@@ -36,18 +36,16 @@ class LightFunctions:
     def evaluate(self, directions: Float[ndarray, "N 3"]) -> Float64[ndarray, "N F 3"]:
         """All functions at unit directions: N B exponentials for each distinct spread."""
         values = np.empty((len(directions), len(self.spreads), 3))
-        for chosen, weights in self._by_spread(directions):
-            coefficients = self._by_center if chosen.all() else self.coefficients[chosen].transpose(1, 0, 2).reshape(len(self.centers), -1)
-            values[:, chosen] = (weights @ coefficients).reshape(len(directions), -1, 3)
+        for coefficients, (chosen, weights) in zip(self._by_color, self._by_spread(directions), strict=True):
+            for c in range(3):
+                values[:, chosen, c] = weights @ coefficients[c]
         return values
 
-    @cached_property
-    def _by_center(self) -> Float32[ndarray, "B M"]:
-        """All coefficients, 3 F of a center in a row."""
-        return np.ascontiguousarray(self.coefficients.transpose(1, 0, 2).reshape(len(self.centers), -1))
-
     def project(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
-        """sum_n color_n w_f(direction_n): the total weights of many lights, or of the texels of an environment map."""
+        """sum_n color_n w_f(direction_n): the total weights of many lights, or of the texels of an environment map.
+
+        Summed over the centers in single precision.
+        """
         projected = np.empty((len(self.spreads), 3))
         for coefficients, (chosen, weights) in zip(self._by_color, self._by_spread(directions), strict=True):
             for c, sums in enumerate((weights.T @ colors).T.astype(np.float32)):

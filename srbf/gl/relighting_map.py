@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float64
 from srbf.asset import Asset
-from srbf.basis.gaussian import TABLE_TOLERANCE, weight_curve
+from srbf.basis.gaussian import TABLE_TOLERANCE, WeightCurve, weight_curve
 from srbf.errors import InputError
 from srbf.gl.context import Limits
 from srbf.gl.includes import Defines
@@ -49,9 +49,11 @@ class MapPasses(Passes):
 
     def _formula(self) -> Defines:
         """R without the table: by the curve of the spread, or where it has none that is as good, by its own formula."""
-        if self._asset.manifest["basis"]["kind"] != "gaussian":
+        basis = self._asset.manifest["basis"]
+        if basis["kind"] != "gaussian":
             return {}
-        curve = weight_curve(self._asset.basis.spread)
+        told = basis.get("curve")
+        curve = weight_curve(basis["spread"]) if told is None else WeightCurve(np.array(told["coefficients"]), told["error"])
         if curve.error > CURVE_ERROR:
             return {"SRBF_FORMULA": 1}
         *first, last = (f"{coefficient:.9e}" for coefficient in curve.coefficients)

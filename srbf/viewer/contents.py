@@ -73,6 +73,12 @@ def contents_of(
     probed = None if probes is None else _probes_beside(assets[0], Asset.open(probes), probes)
     measures = Measures(assets, references.capture if references else None)
     contents: dict[str, Content] = {"": page["index.html"], **page}
+    given_tables = {}
+    for number, given in enumerate(profiles):
+        if given.name in given_tables:
+            raise InputError(f"expected profiles of different names, found two of {given.name}; rename the file")
+        given_tables[given.name] = {"file": f"profile-{number}.exr", "projected": given.projected}
+        contents[f"profile-{number}.exr"] = partial(light_tables.profile_table, given)
     told = []
     names = page_manifest.names(assets, folders)
     for i, (asset, folder, name) in enumerate(zip(assets, folders, names, strict=True)):
@@ -83,15 +89,17 @@ def contents_of(
         if compared is not None:
             errors = f"{CAPTURE}errors-{i}.json"
             contents[errors] = partial(measures.errors, i)
-        tables = {}
-        for number, (profile, (projected, made)) in enumerate(light_tables.profile_files(asset, profiles).items()):
-            tables[profile] = {"file": f"profile-{i}-{number}.exr", "projected": projected}
+        own_tables = {}
+        for number, (profile, made) in enumerate(light_tables.own_profiles(asset).items()):
+            if profile in given_tables:
+                raise InputError(f"expected profiles of different names, found two of {profile}; rename the file")
+            own_tables[profile] = {"file": f"profile-{i}-{number}.exr", "projected": False}
             contents[f"profile-{i}-{number}.exr"] = made
         own = page_manifest.described(asset, name, place, f"spectrum-{i}.json", errors)
         if set(GLOSS) <= asset.images.keys():
             contents[light_tables.LOBE_ALBEDO] = light_tables.lobe_albedo
             own["lobe_albedo"] = light_tables.LOBE_ALBEDO
-        told.append({**own, "profiles": tables})
+        told.append({**own, "profiles": own_tables | given_tables})
     if shown is not None:
         contents[page_manifest.MESH] = shown
     if probed is not None and probes is not None:

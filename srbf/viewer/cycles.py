@@ -18,7 +18,6 @@ from srbf.light_entries import entry_with_file, lights_of
 from srbf.light_profile import Profile
 from srbf.lights import Light
 from srbf.relighting.scene_lights import profiles_of
-from srbf.viewer.light_tables import name_of
 
 PLACE = "cycles"  # what the page posts to, and the folder of what it gets
 MOST_BYTES = 1 << 20  # of a request
@@ -36,7 +35,7 @@ class CyclesRenders:
     def __init__(self, asset: Asset, scene: Path, blender: Path | None = None, profiles: Sequence[Profile] = ()) -> None:
         require_view(asset, scene)
         self._asset, self._scene, self._blender = asset, scene, blender
-        self._given = {name_of(profile): profile for profile in profiles}
+        self._given = {profile.name: profile for profile in profiles}
         self._mutex = threading.Lock()
         self._thread: threading.Thread | None = None
         self._halt = threading.Event()

@@ -10,6 +10,7 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Int
 from srbf.errors import MissingLibraryError
+from srbf.vectors import lengths
 
 
 def has_embree() -> bool:
@@ -42,7 +43,7 @@ class EmbreeTriangles:
     def between(self, starts: np.ndarray, ends: np.ndarray) -> Bool[ndarray, " n"]:
         """Whether a triangle stands between each start and its end, (n, 3) or one of them (3,), m."""
         toward = ends - starts
-        distance = np.linalg.norm(toward, axis=-1)
+        distance = lengths(toward)
         origin = np.broadcast_to(starts, toward.shape)
         return self.occluded(origin, toward / np.maximum(distance, 1e-30)[:, None], distance)
 

@@ -11,7 +11,9 @@ from srbf.arrays import Float, Float32, Float64, Int
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight
 from srbf.microfacets import alpha_of, reflected
 from srbf.unshadowed import irradiance_from
+from srbf.vectors import lengths
 from srbf.visibility.light_rays import CastingLight, has_extent, rays_towards
+from srbf.visibility.linked_triangles import lit_at
 from srbf.visibility.rays import RayTracer, Samples
 from srbf.visibility.receivers import Receivers, spread_points
 from srbf.visibility.shadow_map import ShadowMapper
@@ -54,7 +56,7 @@ class GlossyPixels:
         if self._eye is None:
             return np.broadcast_to(self._axis, points.shape)
         vector = self._eye - np.asarray(points, np.float64)
-        return vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-30)
+        return vector / np.maximum(lengths(vector), 1e-30)[:, None]
 
     def reflected(
         self, pixels: Int[ndarray, " n"], points: ndarray, normals: ndarray, directions: Float64[ndarray, "n 3"]
@@ -119,7 +121,7 @@ class GlossyRays:
         square = np.repeat(self._disc[first : first + each], count, axis=0)
         rays = rays_towards(light, samples.point, samples.normal, self._receivers.sun_angle, lambda: (square + turn) % 1)
         NoL = np.einsum("nc,nc->n", samples.normal, rays.direction)
-        shown = (samples.weight > 0) & self._tracer.lit(samples, light)
+        shown = (samples.weight > 0) & lit_at(self._tracer.lit(light), samples.triangle)
         lit = np.flatnonzero((NoL > LEAST) & shown & (rays.irradiance > 0) & (rays.opening > 0).any(axis=1))
         direction = rays.direction[lit].astype(np.float32)
         own = self._pixels.reflected(pixels[lit], samples.point[lit], samples.normal[lit], rays.direction[lit].astype(np.float64))
@@ -173,4 +175,4 @@ class GlossyMaps:
         if isinstance(light, DirectionalLight):
             return np.broadcast_to(np.array(light.direction, np.float64), self._points.shape)
         vector = np.array(light.position) - self._points
-        return vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-30)
+        return vector / np.maximum(lengths(vector), 1e-30)[:, None]

@@ -12,8 +12,8 @@ from srbf.arrays import Float, Float32, Float64
 from srbf.light_geometry import attenuation, light_vectors, points_on, spot_cone
 from srbf.lights import AreaLight, DirectionalLight, PointLight, SphereLight, SpotLight, has_size, radius_of
 from srbf.unshadowed import irradiance_from
+from srbf.vectors import largest_component, lengths
 from srbf.visibility.receivers import disc_points
-from srbf.visibility.vectors import largest, lengths
 
 SHORT_OF_LIGHT = 1e-4  # m, plus this share of the distance from the origin: rays end before the surface that glows
 MIN_IMPORTANCE = 1e-6  # of samples whose point of the light is below their horizon
@@ -104,7 +104,7 @@ def _weighted(
     """`added`: irradiance by the point of the light that each ray meets, if all of the light were as that point."""
     exact = irradiance_from(light, point, normal)
     importance = np.where(exact > 0, np.maximum(added / np.maximum(exact, 1e-300), MIN_IMPORTANCE), 1)
-    short = SHORT_OF_LIGHT * (1 + largest(point))
+    short = SHORT_OF_LIGHT * (1 + largest_component(point))
     opening = light.factors(point - np.array(light.position)) if isinstance(light, PointLight) else np.ones((len(point), 3))
     return LightRays(unit, np.maximum(distance - short, 0), exact, opening, importance)
 

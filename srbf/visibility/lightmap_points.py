@@ -8,6 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
+from srbf.vectors import lengths
 from srbf.visibility.footprints import FirstHit, footprints
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.surface import surface_at
@@ -55,5 +56,5 @@ class LightmapPoints:
         position, normal = (self._receivers.images[name].reshape(-1, 3)[texel] for name in ("position", "normal"))
         right, down, turn_right, turn_down = (slope[texel] for slope in self._slopes)
         normal = normal + turn_right * offset[:, :1] + turn_down * offset[:, 1:]
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+        normal /= np.maximum(lengths(normal), 1e-20)[:, None]
         return position + right * offset[:, :1] + down * offset[:, 1:], normal

@@ -75,20 +75,20 @@ class PixelLookups:
         `sized`: the light, where it has a size; its exact irradiance counts, times the part of it that is visible. `lit`: on which
         triangles the light shines, None: on all.
         """
-        sums = TexelSums.empty(1, len(self.pixels), np.ones(len(self.pixels)), sized is not None)
+        sums, pixels = TexelSums.empty(1, len(self.pixels), np.ones(len(self.pixels)), sized is not None), np.arange(len(self.pixels))
         for part, samples in zip(self.parts, self.samples, strict=True):
             found = part.read()
-            own, ones = np.searchsorted(self.pixels, samples.texel), np.ones(len(found))
             shown = lit_at(lit, samples.triangle)[:, None].astype(np.float32)
             if sized is None:
-                sums.add(own, max(1, len(own) // max(1, len(self.pixels))), samples.share, ones, found[:, :3] * shown, ones)
+                ones = np.ones(len(found))
+                sums.add(pixels, samples.share, ones, found[:, :3] * shown, ones)
                 continue
             exact, whole = irradiance_from(sized, part.place, part.normal), found[:, 3].astype(np.float64)
             importance = np.where(exact > 0, np.maximum(whole / np.where(exact > 0, exact, 1), MIN_IMPORTANCE), 1)
             visible = visible_part(found) * shown
             if isinstance(sized, PointLight):
                 visible = visible * sized.factors(part.place - np.array(sized.position)).astype(np.float32)
-            sums.add(own, max(1, len(own) // max(1, len(self.pixels))), samples.share, importance, visible, exact)
+            sums.add(pixels, samples.share, importance, visible, exact)
         return sums.mean().astype(np.float32)
 
 

@@ -53,7 +53,7 @@ class NearPasses:
         Places (m) and unit normals of each set.
     texture_size
         Most texels of a side.
-    by_rays
+    traced
         What says how much all receivers see of a cell, in their order; None: shadow cubes about the cells.
     """
 
@@ -64,9 +64,9 @@ class NearPasses:
         places: Float32[ndarray, "C 3"],
         receivers: list[tuple[Float[ndarray, "_ 3"], Float[ndarray, "_ 3"]]],
         texture_size: int,
-        by_rays: NearReceivers | None = None,
+        traced: NearReceivers | None = None,
     ) -> None:
-        self._programs, self._surfels, self._places, self._by_rays = programs, surfels, places, by_rays
+        self._programs, self._surfels, self._places, self._traced = programs, surfels, places, traced
         self._counts = [len(own) for own, _ in receivers]
         resources = Resources(programs.context)
         programs.resources.callback(resources.close)
@@ -122,14 +122,16 @@ class NearPasses:
         for cell in cells:
             if cell in self._kept:
                 self._kept.move_to_end(cell)
-        for cell in [cell for cell in cells if cell not in self._kept]:
-            slot = len(self._kept) if len(self._kept) < self._slots else self._kept.popitem(last=False)[1]
-            self._kept[cell] = slot
-            self.drawn += 1
-            if self._by_rays is None:
-                self._draw_seen(cell, slot)
-            else:
-                self._write_seen(self._by_rays.seen([cell])[0], slot)
+        new = [cell for cell in cells if cell not in self._kept]
+        for cell in new:
+            self._kept[cell] = len(self._kept) if len(self._kept) < self._slots else self._kept.popitem(last=False)[1]
+        self.drawn += len(new)
+        if self._traced is None:
+            for cell in new:
+                self._draw_seen(cell, self._kept[cell])
+        else:
+            for cell, seen in zip(new, self._traced.seen(new), strict=True):
+                self._write_seen(seen, self._kept[cell])
         return [self._kept[cell] for cell in cells]
 
     def _draw_seen(self, cell: int, slot: int) -> None:

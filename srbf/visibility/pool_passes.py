@@ -37,11 +37,11 @@ NEGLIGIBLE, MOST_TERMS = 1e-4, 64  # of all light, that a bounce adds and is the
 class PoolPasses(Passes):
     """Passes over a deep framebuffer. A light that has neither moved nor changed but in color costs one pass over the clusters.
 
-    `by_rays`: shadow rays say what surfels see of lights, and receivers of bright surfels, as in numpy, where embreex is installed. Shadow
+    `shadow_rays`: rays say what surfels see of lights, and receivers of bright surfels, as in numpy, where embreex is installed. Shadow
     cubes do otherwise, whose edges are those of their texels. `computed` counts the lights whose bounces were computed.
     """
 
-    by_rays: ClassVar[bool] = True
+    shadow_rays: ClassVar[bool] = True
 
     def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
         self._asset, self._programs, self._textures, self._limits = asset, programs, textures, limits
@@ -101,7 +101,7 @@ class PoolPasses(Passes):
         self._toward_lobes = pool[2:, :, :3].sum(axis=0)  # albedo, and what lobes see beyond it
         names, scene = asset.manifest["gather"].get("objects", ()), asset.required_scene()
         linked = LinkedLight(cells, scene, names, surfel_objects(pool, names))
-        occluders = _occluders(scene) if self.by_rays else None
+        occluders = _occluders(scene) if self.shadow_rays else None
         self._surfels = SurfelLight(self._programs, cells, scene, by_rays=linked, cubes=occluders is None)
         self._links = LinkPasses(asset, self._programs, self._textures, terms)
         self._sums = [self._programs.target(self._links.cluster_size) for _ in range(2)]  # the first has the sum
@@ -122,7 +122,8 @@ class PoolPasses(Passes):
         """The irradiance of all clusters under a light in white."""
         gl: Any = self._programs.context
         texture, target = self._free.pop() if self._free else self._programs.target(self._links.cluster_size)
-        direct, near = self._surfels.draw(replace(light, color=WHITE)), None
+        direct: moderngl.Texture = self._surfels.draw(replace(light, color=WHITE))
+        near = None
         if self._near is not None:
             direct, near = self._split(light, direct, self._near)
         gl.enable_only(gl.NOTHING)
@@ -132,15 +133,14 @@ class PoolPasses(Passes):
 
     def _split(self, light: Light, direct: moderngl.Texture, passes: NearPasses) -> tuple[moderngl.Texture, NearTextures | None]:
         """Irradiance on the surfels without its part on bright ones, and what these add; all of it where none is bright."""
-        count = len(self._cells.places)
-        irradiance = np.frombuffer(direct.read(), np.float32).reshape(-1, 4)[:count, :3]
+        irradiance = self._surfels.read()
         near = self._pool.sources(self._cells.albedo * irradiance, light)
         if not near.count:
             return direct, None
         taken = near.taken(irradiance)
         colors = ((self._far, irradiance - taken), (self._second, irradiance - taken), (self._taken, self._toward_lobes * taken))
         for (texture, _), values in colors:
-            texture.write(folded(np.column_stack([values, np.zeros(count, np.float32)])))
+            texture.write(folded(np.column_stack([values, np.zeros(len(values), np.float32)])))
         self._near_clusters[1].clear()
         passes.draw(near, [self._second[1], self._near_clusters[1]])
         return self._far[0], NearTextures(self._second[0], self._taken[0], self._near_clusters[0])

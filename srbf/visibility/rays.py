@@ -11,11 +11,12 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
-from srbf.compute.threads import each
+from srbf.compute.threads import each, one_blas_thread
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.light_linking import Objects
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, has_size
 from srbf.unshadowed import irradiance_from
+from srbf.vectors import largest_component, lengths
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.environment_rays import RAYS as ENVIRONMENT_RAYS
 from srbf.visibility.environment_rays import EnvironmentSampler
@@ -29,7 +30,6 @@ from srbf.visibility.shadow import rounded_share
 from srbf.visibility.shadow_rays import RAY_OFFSET, ShadowRays
 from srbf.visibility.surface import surface_at
 from srbf.visibility.texel_sums import TexelSums
-from srbf.visibility.vectors import largest, lengths
 
 FIRST_SAMPLES = 4  # of every texel
 FIRST_IN_VIEW, FINE_VIEW = 16, 1 << 18  # of every pixel, where shadows of thin things fall between few; of views of at most so many pixels
@@ -158,34 +158,36 @@ class RayTracer:
             self._shadow_rays[blockers] = ShadowRays(casting(self._receivers.triangles, blockers))
         return self._shadow_rays[blockers]
 
-    def lit(self, samples: Samples, light: CastingLight) -> Bool[ndarray, " n"]:
-        """Whether a light shines on the object that each sample is of."""
-        return lit_at(lit_triangles(self._receivers.triangles, light), samples.triangle)
+    def lit(self, light: CastingLight) -> Bool[ndarray, " T"] | None:
+        """On which triangles a light shines; None: on all."""
+        return lit_triangles(self._receivers.triangles, light)
 
     def _irradiance(self, light: CastingLight) -> Float32[ndarray, "P 3"]:
         self._casting(light.blockers)  # once, before threads ask for it
+        shown = self.lit(light)
         sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), has_size(light))
         weight = np.zeros(len(sums.total))
         starts = range(0, len(self._texels), max(1, BATCH // self._few))
 
         def first(number: int) -> None:
             samples = self._first(starts[number], starts.step)
-            self._add(sums, samples, light, range(self._few))
+            self._add(sums, samples, light, shown, range(self._few))
             weight[self._texels[starts[number] : starts[number] + starts.step]] = samples.weight.reshape(self._few, -1).sum(axis=0)
 
-        each(first, len(starts))
+        with one_blas_thread():
+            each(first, len(starts))
         sums = sums.relative(self._texels)
         partly = (weight > 0) & (weight < self._few)
         refined = np.zeros(len(weight), bool)
         for _ in range(SPREAD_ROUNDS):
             new = self._texels[((sums.ragged() | partly | self._outlines) & ~refined)[self._texels]]
-            self._refine(sums, light, new, range(self._few, self._count))
+            self._refine(sums, light, shown, new, range(self._few, self._count))
             refined[new] = True
         edges = np.flatnonzero(refined & sums.edges())
         share = len(edges) / max(1, int((sums.total[self._texels] > 0).any(axis=1).sum()))  # of what is lit
         enough = max(MAX_SAMPLES // 8, int(MAX_SAMPLES * min(1.0, share / MANY_EDGES)))
         most = min(self._most, enough, self._count + EDGE_BUDGET * len(self._texels) // max(1, len(edges)))
-        self._refine(sums, light, edges, range(self._count, most))
+        self._refine(sums, light, shown, edges, range(self._count, most))
         return sums.mean().astype(np.float32)
 
     def _of_environment(self, light: EnvironmentLight) -> Float32[ndarray, "P 3"]:
@@ -200,10 +202,11 @@ class RayTracer:
             samples = self._samples(self._texels[starts[number] : starts[number] + step], range(ENVIRONMENT_POINTS))
             found[number] = samples, self._under_environment(samples, sampler, np.random.default_rng(starts[number]))
 
-        each(trace, len(starts))
+        with one_blas_thread():
+            each(trace, len(starts))
         for samples, visible in found:
             ones = np.ones(len(samples.texel))
-            sums.add(samples.texel, ENVIRONMENT_POINTS, samples.share, ones, visible, ones)
+            sums.add(samples.texel[: len(ones) // ENVIRONMENT_POINTS], samples.share, ones, visible, ones)
         return sums.mean().astype(np.float32)
 
     def _under_environment(self, samples: Samples, sampler: EnvironmentSampler, rng: np.random.Generator) -> Float32[ndarray, "n 3"]:
@@ -222,7 +225,7 @@ class RayTracer:
         point, face = samples.point[chosen], samples.face[chosen]
         NoL, NgL = (np.einsum("nc,nc->n", normal, direction) for normal in (samples.normal[chosen], face))
         origin = point + samples.lift[chosen] * rounded_share(NoL, NgL)[:, None]
-        offset = np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + largest(point))
+        offset = np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + largest_component(point))
         return (origin + face * offset[:, None]).astype(np.float32)
 
     def _scale(self, light: CastingLight) -> Float64[ndarray, " P"] | None:
@@ -236,15 +239,18 @@ class RayTracer:
         scale[self._texels] = irradiance_from(light, position, normal)
         return scale if self._receivers.camera is None else _most_beside(scale, self._receivers.height)
 
-    def _refine(self, sums: TexelSums, light: CastingLight, texels: Int[ndarray, " e"], numbers: range) -> None:
-        """Add samples `numbers` of `texels`."""
+    def _refine(
+        self, sums: TexelSums, light: CastingLight, shown: Bool[ndarray, " T"] | None, texels: Int[ndarray, " e"], numbers: range
+    ) -> None:
+        """Add samples `numbers` of `texels`; `shown`: triangles that the light shines on."""
         starts = range(0, len(texels) if len(numbers) else 0, max(1, BATCH // max(1, len(numbers))))
 
         def add(number: int) -> None:
             own = texels[starts[number] : starts[number] + starts.step]
-            self._add(sums, self._samples(own, numbers), light, numbers)
+            self._add(sums, self._samples(own, numbers), light, shown, numbers)
 
-        each(add, len(starts))
+        with one_blas_thread():
+            each(add, len(starts))
 
     def _first(self, start: int, count: int) -> Samples:
         if start in self._kept:
@@ -255,7 +261,7 @@ class RayTracer:
             self._kept[start] = samples
         return samples
 
-    def _add(self, sums: TexelSums, samples: Samples, light: CastingLight, numbers: range) -> None:
+    def _add(self, sums: TexelSums, samples: Samples, light: CastingLight, shown: Bool[ndarray, " T"] | None, numbers: range) -> None:
         """Add the light that reaches each sample from a white light."""
         count = len(samples.texel)
 
@@ -265,11 +271,13 @@ class RayTracer:
 
         rays = rays_towards(light, samples.point, samples.normal, self._receivers.sun_angle, square)
         NoL = np.einsum("nc,nc->n", samples.normal, rays.direction)
-        visible = (rays.opening * self.lit(samples, light)[:, None]).astype(np.float32)
-        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (largest(visible) > 0))
+        visible = rays.opening.astype(np.float32)
+        if shown is not None:
+            visible *= lit_at(shown, samples.triangle)[:, None]
+        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (largest_component(visible) > 0))
         distance = None if rays.distance is None else rays.distance[lit]
         visible[lit] *= self.reaching(samples, lit, rays.direction[lit].astype(np.float32), distance, light.blockers)
-        sums.add(samples.texel, len(numbers), samples.share, rays.importance, visible, rays.irradiance)
+        sums.add(samples.texel[: count // len(numbers)], samples.share, rays.importance, visible, rays.irradiance)
 
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Sample points `numbers` of each texel, ordered by sample."""
@@ -301,7 +309,7 @@ class RayTracer:
         if self._bumps is not None:
             smooth, bump = self._bumps
             turned = normal + self._bump_at(bump, texel, offset) * (np.einsum("nc,nc->n", normal, smooth[texel]) > SAME_NORMAL)[:, None]
-            normal = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-20)
+            normal = turned / np.maximum(lengths(turned), 1e-20)[:, None]
         weight = real.astype(np.float32)
         share = weight[:, None]
         if self._materials is not None:

@@ -14,6 +14,7 @@ from srbf.io.scene_glb import read_triangles
 from srbf.light_geometry import environment_samples, soft_cone
 from srbf.light_linking import Objects
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
+from srbf.vectors import lengths
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.linked_triangles import casting
 from srbf.visibility.surface_cells import OFFSET, Cells, frames
@@ -25,9 +26,13 @@ NEAR_CONE, WIDEST = 64.0, 2 * np.pi / 3  # of a spot of a half-angle below that,
 Strength = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # (n, 1), or (n, 3) by a profile
 
 
-@functools.lru_cache(maxsize=16)
 def occluders_of(scene: bytes, blockers: Objects | None = None) -> EmbreeTriangles:
     """What casts shadows in a scene.glb, ready for rays, `blockers` alone where a light chooses; MissingLibraryError without embreex."""
+    return _occluders(scene, blockers)
+
+
+@functools.lru_cache(maxsize=16)
+def _occluders(scene: bytes, blockers: Objects | None) -> EmbreeTriangles:
     triangles = casting(read_triangles(scene), blockers)
     return EmbreeTriangles(triangles.corners[triangles.occluders])
 
@@ -173,7 +178,7 @@ class ReceivedLight:
         """`amount` where it is above 0 and nothing stands between a cell and `place`."""
         front = np.flatnonzero((amount > 0).any(axis=1))
         vector = place - self._starts[front]
-        distance = np.linalg.norm(vector, axis=1)
+        distance = lengths(vector)
         result = np.zeros_like(amount)
         visible = self._shadows.visible(front, vector / np.maximum(distance, 1e-30)[:, None], distance)
         result[front] = amount[front] * np.asarray(visible)[:, None]

@@ -7,6 +7,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Int
 from srbf.io.scene_glb import Triangles
+from srbf.vectors import lengths
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.shadow import transmittance
 
@@ -53,5 +54,5 @@ class ShadowRays:
     def _wall(self, wall: Int[ndarray, " n"], bary: Float32[ndarray, "n 3"], direction: Float32[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
         """Transmittance of one wall at the angle of each ray."""
         normal = np.einsum("nk,nkc->nc", bary, self._filter_normals[wall])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+        normal /= np.maximum(lengths(normal), 1e-20)[:, None]
         return transmittance(self._transmittance[self._filter_material[wall]], np.einsum("nc,nc->n", normal, direction))

@@ -49,11 +49,12 @@ class Cascades:
 
     @functools.cached_property
     def _nested(self) -> list[Float[ndarray, "n 3"]]:
-        """The receivers that are nearer than each fraction of the largest distance."""
+        """The receivers that are nearer than each fraction of the largest distance: parts of one array, the nearest first."""
         assert self._distances is not None
-        far = float(self._distances.max(initial=0))
-        parts = [self._points[self._distances <= far / RATIO**step] for step in range(1, STEPS + 1)]
-        return [part for part in parts if len(part) >= FEWEST]
+        order = np.argsort(self._distances)
+        points, distances = self._points[order], self._distances[order]
+        counts = np.searchsorted(distances, distances.max(initial=0) / RATIO ** np.arange(1, STEPS + 1), side="right")
+        return [points[:count] for count in counts if count >= FEWEST]
 
     def frames(self, direction: Float64[ndarray, " 3"], size: int) -> list[SunFrame]:
         """The frames of maps of `size` texels per side, the finest first; the last one holds all receivers."""

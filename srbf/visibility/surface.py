@@ -7,7 +7,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float64, Int
 from srbf.io.scene_glb import Triangles
-from srbf.visibility.vectors import lengths
+from srbf.vectors import lengths
 
 SMOOTH_COS = 1 - 1e-6  # corner normals closer than that to the face normal belong to a flat face
 

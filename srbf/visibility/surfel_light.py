@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float64
+from srbf.arrays import Float32, Float64
 from srbf.gl.deep_framebuffer import folded
 from srbf.gl.programs import Programs
 from srbf.io.scene_glb import read_triangles
@@ -60,19 +61,38 @@ class SurfelLight:
         places = cells.places.astype(np.float64)
         self.center: Float64[ndarray, " 3"] = (places.min(axis=0) + places.max(axis=0)) / 2  # single precision is finest about the origin
         self._lift = lift_of(places)
-        self._places = self._resources.texture(folded(np.column_stack([places - self.center, cells.areas]).astype(np.float32)))
-        self._normals = self._resources.texture(folded(cells.normals))
-        self.casters = ShadowCasters(self._resources, read_triangles(scene), self.center)
-        self.maps, self._size = ShadowMaps.of(self._resources, size), size
-        self.texture, self._target = self._resources.target(self._places.size, 4, "f4")
-        self._profiles = ProfileTextures(self._resources)
+        self._cells, self._scene, self._size = cells, scene, size
+        rows, across, _ = folded(cells.normals).shape
+        self.texture, self._target = self._resources.target((across, rows), 4, "f4")
         self._by_rays = LinkedLight(cells, scene, (), None) if by_rays is None else by_rays
+        self._traced_last: Float32[ndarray, "N 3"] | None = None
+
+    @functools.cached_property
+    def casters(self) -> ShadowCasters:
+        """The triangles that cast shadows, on the GPU once a cube is drawn."""
+        return ShadowCasters(self._resources, read_triangles(self._scene), self.center)
+
+    @functools.cached_property
+    def maps(self) -> ShadowMaps:
+        """The face of a shadow cube that was drawn last."""
+        return ShadowMaps.of(self._resources, self._size)
+
+    @functools.cached_property
+    def _surfaces(self) -> tuple[moderngl.Texture, moderngl.Texture]:
+        """Places with areas, and normals."""
+        places = np.column_stack([self._cells.places - self.center, self._cells.areas]).astype(np.float32)
+        return self._resources.texture(folded(places)), self._resources.texture(folded(self._cells.normals))
+
+    @functools.cached_property
+    def _profiles(self) -> ProfileTextures:
+        return ProfileTextures(self._resources)
 
     def draw(self, light: Light) -> moderngl.Texture:
-        """The irradiance of one light of the asset's frame, until the next call; blending is left on and additive.
+        """The irradiance of one light of the asset's frame, until the next call; by cubes, blending is left on and additive.
 
-        MissingLibraryError for directional and environment lights without embreex.
+        MissingLibraryError without embreex for lights that have no cube.
         """
+        self._traced_last = None
         if not self._cubes or not isinstance(light, (PointLight, AreaLight)) or choices_of(light):
             return self._traced(light)
         gl: Any = self._programs.context
@@ -81,7 +101,7 @@ class SurfelLight:
         for point, lambertian, weight in points_of(light):
             for uniforms in self.faces(point):
                 self._target.use()
-                for unit, texture in enumerate((self._places, self._normals, self.maps.heights[0])):
+                for unit, texture in enumerate((*self._surfaces, self.maps.heights[0])):
                     texture.use(unit)
                 if point.profile is not None:
                     self._profiles.of(point.profile).use(3)
@@ -99,6 +119,12 @@ class SurfelLight:
                 self._programs.run("deep_framebuffer_surfels.frag", {}, {**uniforms, **units})
         return self.texture
 
+    def read(self) -> Float32[ndarray, "N 3"]:
+        """What was drawn last, without waiting for the GPU where rays told it."""
+        if self._traced_last is not None:
+            return self._traced_last
+        return np.frombuffer(self.texture.read(), np.float32).reshape(-1, 4)[: len(self._cells.places), :3]
+
     def faces(self, light: PointLight) -> Iterator[dict[str, Any]]:
         """Draw the shadow cube about a light into `maps`, face after face, or one map of a narrow spot; the uniforms that look it up."""
         local = replace(light, position=triple(np.array(light.position) - self.center))
@@ -110,7 +136,8 @@ class SurfelLight:
             yield {**uniforms, **{f"pointLight.{name}": value for name, value in uniforms["pointLight"].items()}}
 
     def _traced(self, light: Light) -> moderngl.Texture:
-        found = folded(self._by_rays.irradiance(light).astype(np.float32))
+        self._traced_last = self._by_rays.irradiance(light).astype(np.float32)
+        found = folded(self._traced_last)
         self.texture.write(np.ascontiguousarray(np.pad(found, ((0, 0), (0, 0), (0, 1)))))
         return self.texture
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
-from srbf.visibility.vectors import largest
+from srbf.vectors import largest_component
 
 REFINE_STEP = 0.005  # over the usual irradiance: between samples of one texel, or between neighbors, from which it is refined
 NEIGHBOR_STEP = 0.05  # between neighbors: a shadow edge may cross a corner without samples
@@ -63,18 +63,18 @@ class TexelSums:
 
     def add(
         self,
-        texel: Int[ndarray, " n"],
-        samples: int,
+        texels: Int[ndarray, " T"],
         share: Float[ndarray, "n _"],
         importance: Float64[ndarray, " n"],
         visible: Float32[ndarray, "n 3"],
         irradiance: Float64[ndarray, " n"],
     ) -> None:
-        """Add so many samples of each of some distinct texels, ordered by sample: what each sees of the light, its unshadowed irradiance.
+        """Add as many samples of each of some distinct texels, ordered by sample: what each sees of the light, its unshadowed irradiance.
 
         Threads may add to different texels.
         """
-        texels = texel[: len(texel) // samples]
+        samples = max(1, len(visible) // max(1, len(texels)))
+        assert samples * len(texels) == len(visible), "as many samples of every texel"
         light = visible * irradiance[:, None].astype(np.float32)
         every = np.broadcast_to(share, light.shape)
         weight = every * importance[:, None] if self.sized else every
@@ -91,7 +91,7 @@ class TexelSums:
             count(self.seen, weight * visible)
         if self.sized:
             count(self.weight, weight)
-        real = (largest(weight) > COUNTS)[:, None]
+        real = (largest_component(weight) > COUNTS)[:, None]
         measured = visible if self.sized else light
         self.low[texels] = np.minimum(self.low[texels], by_sample(np.where(real, measured, np.float32(np.inf))).min(axis=0))
         self.high[texels] = np.maximum(self.high[texels], by_sample(np.where(real, measured, np.float32(0))).max(axis=0))

@@ -74,7 +74,7 @@ ELSEWHERE = {
     "srbf view --scene *": "tests/extension/test_light_this_shot.py::test_a_true_shot_is_served",
     "srbf relight --scene-lights *": "tests/bake/test_scene_lights.py::test_relighting_by_them_is_what_cycles_renders",
     "srbf relight --scene-lights --reference *": "tests/bake/test_scene_lights.py::test_a_relit_picture_is_compared_with_cycles",
-    "srbf view --profile *": "tests/viewer/test_gloss.py::test_a_given_image_is_projected",
+    "srbf view --profile *": "tests/viewer/test_gloss.py::test_the_command_takes_profiles",
     "srbf view --probes *": "tests/viewer/test_ball.py::test_the_command_takes_probes_with_it",
     "npm ci *": "tests/npm_package.py::npm",
     "npm test *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",

@@ -49,7 +49,7 @@ def _(evaluate: Evaluate) -> None:
 def _(evaluate: Evaluate) -> None:
     """As numpy has it, and as near to R as it says."""
     versine = np.concatenate([np.linspace(-0.1, 2.1, 500), np.geomspace(1e-12, 1e-2, 60), [0, 1, 2]]).astype(np.float32)
-    for spread in (0.05, 0.12, 0.3, 0.45, 0.6, 1.0):
+    for spread in (0.01, 0.05, 0.12, 0.3, 0.45, 0.6, 1.0):
         curve = gaussian.weight_curve(spread)
         *first, last = (f"{coefficient:.9e}" for coefficient in curve.coefficients)
         code = f"vec4(srbfWeightCurve(a.x, vec4({', '.join(first)}), {last}))"

@@ -65,7 +65,7 @@ class Browser:
 
     def state(self) -> dict[str, Any]:
         """What the address says."""
-        return json.loads(unquote(self("address").split("#", 1)[1].replace("'", '"')))
+        return json.loads(unquote(self("address").split("#", 1)[1].replace("'", "%22")))
 
     def file(self, text: str) -> bytes:
         """What the button of that name hands out."""

@@ -107,3 +107,9 @@ def test_lights_that_choose_and_others_add_up() -> None:
 def test_triangles_without_objects_say_so() -> None:
     with pytest.raises(InputError, match="bake again"):
         RayTracer(build_plane()).response([replace(LIGHTS["point"], receivers=Objects(only=("Roof",)))])
+
+
+@pytest.mark.parametrize("entry", [{"without": None}, {"only": 3}, {"only": "Cup"}, {"only": [""]}, {"without": [2]}])
+def test_names_of_another_kind_are_refused(entry: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="expected names of objects"):
+        Objects.of_entry(entry)

@@ -2,10 +2,12 @@
 import { type Asset, lightDomainOf, type Manifest, type Triple } from "../src";
 import { ends, heat } from "./direction_widget";
 import { isPlaced, type LightState, linearColor, namedState, type PlacedState, pointState } from "./light_state";
-import { stateOf } from "./keyframes";
+import { type Profiles, stateOf } from "./keyframes";
 import { MOST_LIGHTS } from "./state";
 import type { BakedLight } from "./reference";
 import type { Bounds } from "./receivers";
+import type { Subject } from "./subject";
+import { surfaceFacts } from "./surface_state";
 
 const REACH = 0.25; // of the room's radius: where the first light lays an irradiance of 1, so that white walls are not clipped
 const OUTSIDE = 0.1; // of the longest side of the box about free places: the page says so of a light farther out
@@ -23,11 +25,26 @@ export function kindsOf(asset: Asset): readonly AddedKind[] {
   return asset.position ? ["directional", "point", "spot", "environment"] : ["directional", "environment"];
 }
 
-/** The lights that the scene has by itself, all of them, as it has them set. @throws SrbfError on damaged ones. */
-export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(light, `light ${name} of the asset`, "inverse-square", profileNames(manifest)), name }) as LightState);
+/** What the panel shows by of an asset. */
+export function assetFacts({ asset, maps, hasDirect, sunAngle, profiles }: Subject) {
+  return {
+    maps: asset.tables.gather ? 0 : maps,
+    kinds: kindsOf(asset),
+    middle: middleOf(asset),
+    hasDirect,
+    sunAngle,
+    profiles,
+    designed: (asset.manifest.scene_lights ?? []).length > 0,
+    hasDisc: lightDomainOf(asset.manifest) === "directions",
+    ...surfaceFacts(asset),
+  };
+}
 
-/** The names of the profiles of the scene's own lights. */
-const profileNames = ({ scene_profiles }: Manifest): string[] => Object.keys(scene_profiles ?? {});
+/** The lights that the scene has by itself, all of them, as it has them set. @throws SrbfError on damaged ones. */
+export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(light, `light ${name} of the asset`, "inverse-square", ownProfiles(manifest)), name }) as LightState);
+
+/** Those of the scene's own lights: IES files. */
+const ownProfiles = ({ scene_profiles }: Manifest): Profiles => new Map(Object.keys(scene_profiles ?? {}).map((name) => [name, { projected: false }]));
 
 /** The scene's own lights as asset.json has them. */
 export type Designed = readonly { name: string; light: Record<string, unknown> }[];
@@ -35,12 +52,13 @@ export type Designed = readonly { name: string; light: Record<string, unknown> }
 /** The linear color of a light: that of asset.json where it is as designed, since the page rounds colors to bytes. */
 export function exactColor(light: LightState, designed: Designed): Triple {
   const own = light.name === undefined || light.kind === "named" ? undefined : designed.find(({ name }) => name === light.name);
-  const before = own && stateOf(own.light, own.name, "inverse-square", [own.light.profile as string]);
+  const before = own && stateOf(own.light, own.name, "inverse-square", new Map([[own.light.profile as string, { projected: false }]]));
   return own && before?.color === light.color && before.intensity === light.intensity ? (own.light.color as Triple) : linearColor(light);
 }
 
-/** What the page does not show of the scene's lights, in one line; empty where it shows all of them. */
-export function missingLine({ manifest }: Asset): string {
+/** What the page does not show of the scene's lights and of `lights`, in one line; empty where it shows all of them. */
+export function missingLine({ asset: { manifest }, profiles }: Subject, lights: readonly LightState[]): string {
+  const shapes = lights.flatMap((light) => ("profile" in light && light.profile !== undefined && !profiles.has(light.profile) ? [light.profile] : []));
   const beyond = (manifest.scene_lights ?? []).slice(MOST_LIGHTS).map(({ name }) => name);
   const linked = (manifest.scene_lights ?? []).flatMap(({ name, light }) => (light.receivers ?? light.blockers ? [name] : []));
   const left = (manifest.scene_lights_left_out ?? []).map(({ name }) => name);
@@ -48,6 +66,7 @@ export function missingLine({ manifest }: Asset): string {
     beyond.length ? `lights past ${MOST_LIGHTS}: ${beyond.join(", ")}` : "",
     linked.length ? `light linking not shown: ${linked.join(", ")}` : "",
     left.length ? `lights left out: ${left.join(", ")}` : "",
+    shapes.length ? `lights shine without ${[...new Set(shapes)].join(", ")}: give srbf view these files by --profile` : "",
   ]
     .filter(Boolean)
     .join("; ");

@@ -10,14 +10,14 @@ const TYPES = { directional: "SUN", point: "POINT", sphere: "POINT", spot: "SPOT
 
 /**
  * The text of the script; environments and named lights are left out. A light with a name sets the scene's light of that name where there is one; all others are made.
- * `designed`: the scene's own lights; those that the page no longer has are hidden.
+ * `sunAngle`: of suns without an angle of their own that are made, degrees. `designed`: the scene's own lights; those that the page no longer has are hidden.
  */
-export function blenderRig(lights: readonly LightState[], designed: Designed = []): string {
+export function blenderRig(lights: readonly LightState[], sunAngle = 0, designed: Designed = []): string {
   const shining = new Set(shiningOf(lights));
   const told = lights.flatMap((light, i) => {
     if (light.kind === "environment" || light.kind === "named") return [];
     const name = light.name ?? `srbf ${light.kind} ${i + 1}`;
-    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], profile: "profile" in light ? (light.profile ?? null) : null, ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), ...placed(light) }];
+    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], profile: ownProfile(light, designed), ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), ...placed(light) }];
   });
   const kept = new Set(lights.map(({ name }) => name));
   const removed = designed.flatMap(({ name }) => (kept.has(name) ? [] : [name]));
@@ -107,7 +107,10 @@ for told in LIGHTS:
         continue
     data = bpy.data.lights.new(told["name"], told["type"])
     if data.type == "SUN":
-        data.angle = 0  # unless told otherwise
+        data.angle = ${(sunAngle * Math.PI) / 180}  # unless told otherwise
+    elif data.type == "SPOT":
+        data.shadow_soft_size = 0  # unless told otherwise
+        data.use_soft_falloff = False  # else it is a disk that turns to each receiver
     light = bpy.data.objects.new(told["name"], data)
     fill(light, told, told["settings"])
     collection.objects.link(light)
@@ -123,6 +126,12 @@ function wattsOf(light: LightState): number {
 function colored(color: Triple, watts: number): { energy: number; color: Triple } {
   const most = Math.max(...color, 1e-30);
   return { energy: watts * Math.max(...color), color: color.map((x) => x / most) as unknown as Triple };
+}
+
+/** The profile that a light of the scene has there and still has; null of others, since the script has no files. */
+function ownProfile(light: LightState, designed: Designed): string | null {
+  const own = designed.find(({ name }) => name === light.name)?.light.profile;
+  return "profile" in light && light.profile !== undefined && light.profile === own ? light.profile : null;
 }
 
 type Made = Exclude<LightState, { kind: "environment" | "named" }>;
@@ -142,7 +151,7 @@ function placed(light: Made): { matrix: number[][]; settings: Record<string, unk
   if (light.kind === "spot") {
     const [inner, outer] = [light.inner, light.outer].map((degrees) => Math.cos((degrees * Math.PI) / 180));
     const [across, up] = light.profile === undefined ? levelSides(back) : profileFrame(unit(aim(light)), light.roll);
-    const settings = { shadow_soft_size: light.size ?? 0, spot_size: (light.outer * Math.PI) / 90, spot_blend: Math.min(1, (inner - outer) / Math.max(1 - outer, 1e-9)) };
+    const settings = { ...(light.size === undefined ? {} : { shadow_soft_size: light.size }), spot_size: (light.outer * Math.PI) / 90, spot_blend: Math.min(1, (inner - outer) / Math.max(1 - outer, 1e-9)) };
     return { matrix: matrix(across, up, back, light.position), settings };
   }
   const across = unit(sides(light)[0]);

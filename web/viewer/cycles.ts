@@ -74,7 +74,7 @@ export class Cycles {
   /** Render the present lights. */
   async render(lights: readonly LightState[]): Promise<void> {
     if (this.rendering) return;
-    if (hasEnvironment(lights)) return say("expected lights inside the scene for a render by Cycles, found an environment; turn it off");
+    if (hasEnvironment(lights)) return say("expected lights other than environments for a render by Cycles, found an environment; turn it off");
     this.rendering = true;
     this.status = { state: "idle" };
     this.page.wait();

@@ -1,14 +1,12 @@
 /** Files that are dropped on the page: keyframes to play, and environment maps. */
 import { SrbfError } from "../src";
 import { type Environment, readEnvironment } from "./environment_file";
-import { Keyframes, readFrames } from "./keyframes";
+import { FRAMES_PER_SECOND, Keyframes, type Profiles, readFrames } from "./keyframes";
 import { environmentState } from "./light_state";
 import { MOST_LIGHTS, type State } from "./state";
 
-const FRAMES_PER_SECOND = 24;
-
-/** Keyframes that play from now on; `usual`: the falloff of lights that do not say; `profiles`: names that they may have. @throws SrbfError on other files. */
-export async function droppedFrames(file: File, state: State, usual: "linear" | "inverse-square", profiles: readonly string[]): Promise<Keyframes> {
+/** Keyframes that play from now on; `usual`: the falloff of lights that do not say; `profiles`: those that they may have. @throws SrbfError on other files. */
+export async function droppedFrames(file: File, state: State, usual: "linear" | "inverse-square", profiles: Profiles): Promise<Keyframes> {
   const keyframes = new Keyframes(readFrames(await file.text(), file.name, usual, profiles), state);
   keyframes.show(0);
   const { length } = keyframes.frames;

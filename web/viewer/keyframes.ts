@@ -5,13 +5,18 @@ import { SrbfError, type Triple } from "../src";
 import { KEPT_KEYS, levelSides, type LightState, round, rounded } from "./light_state";
 import { MOST_LIGHTS, type State } from "./state";
 
+export const FRAMES_PER_SECOND = 24;
+const NONE: Profiles = new Map();
+
 type Entry = Record<string, unknown>;
+/** Profiles that lights may have, by name: IES files, or images for spots to project. */
+export type Profiles = ReadonlyMap<string, { readonly projected: boolean }>;
 
 /**
- * Frames of a file's text; `usual`: the falloff of point lights that do not say; `profiles`: names that they may have. @throws SrbfError in one line on
+ * Frames of a file's text; `usual`: the falloff of point lights that do not say; `profiles`: those that they may have. @throws SrbfError in one line on
  * anything else.
  */
-export function readFrames(text: string, name: string, usual: "linear" | "inverse-square" = "linear", profiles: readonly string[] = []): LightState[][] {
+export function readFrames(text: string, name: string, usual: "linear" | "inverse-square" = "linear", profiles = NONE): LightState[][] {
   let json: { frames?: { lights?: Entry[] }[] };
   try {
     json = JSON.parse(text);
@@ -65,8 +70,8 @@ export class Keyframes {
       return false;
     }
     const others = frame.length !== lights.length || frame.some((light, i) => light.kind !== lights[i].kind || profileOf(light) !== profileOf(lights[i]));
-    if (others) lights.splice(0, lights.length, ...frame.map((light) => structuredClone(light)));
-    else frame.forEach((light, i) => become(lights[i], structuredClone(light)));
+    if (others) lights.splice(0, lights.length, ...frame.map((light, i) => ({ ...structuredClone(light), solo: lights[i]?.solo })));
+    else frame.forEach((light, i) => assignLight(lights[i], structuredClone(light)));
     this.state.selected = Math.min(this.state.selected, lights.length - 1);
     return others;
   }
@@ -75,14 +80,14 @@ export class Keyframes {
 const profileOf = (light: LightState) => ("profile" in light ? light.profile : undefined);
 
 /** Give a light, which controls hold, all that another one has; whether it shines alone stays. */
-function become(light: LightState, other: LightState): void {
+function assignLight(light: LightState, other: LightState): void {
   const own = light as unknown as Record<string, unknown>;
   for (const key of Object.keys(own)) if (key !== "solo" && !(key in other)) delete own[key];
   Object.assign(light, other);
 }
 
 /** The state of a light of FRAMES.json, whose profile is one of `profiles`. @throws SrbfError that names `where`. */
-export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-square", profiles: readonly string[] = []): LightState {
+export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-square", profiles = NONE): LightState {
   const bad = (expected: string, found: unknown): never => {
     throw new SrbfError(`expected ${expected} in ${where}, found ${JSON.stringify(found) ?? "none"}`);
   };
@@ -97,7 +102,11 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
     return value as number;
   };
   const degrees = (key: string) => round((number(key, 0) * 180) / Math.PI);
-  if (entry.profile !== undefined && !profiles.includes(entry.profile as string)) bad(profiles.length ? `a profile of ${profiles.join(", ")}` : "lights without a profile, since this asset has none,", entry.profile);
+  if (entry.size !== undefined && !(number("size", 0) >= 0)) bad("a size of 0 or more", entry.size);
+  if (entry.angle !== undefined && !(degrees("angle") >= 0 && degrees("angle") < 180)) bad("an angle of 0 to pi", entry.angle);
+  const profile = profiles.get(entry.profile as string);
+  if (entry.profile !== undefined && !profile) bad(profiles.size ? `a profile of ${[...profiles.keys()].join(", ")}` : "lights without a profile, since this asset has none,", entry.profile);
+  if (profile?.projected && !(entry.kind === "spot" && number("outer", Infinity) < Math.PI / 2)) bad("a spot of an outer half-angle below pi / 2 to project an image", entry.kind);
   const color = triple("color", [1, 1, 1]);
   if (color.some((x) => x < 0)) bad("colors of 0 or more", color);
   const intensity = entry.kind === "named" ? number("intensity", 1) : 1;
@@ -117,7 +126,7 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
   if (entry.kind === "point") return { kind: "point", ...point };
   if (entry.kind === "sphere") return { kind: "sphere", ...point, size: round(number("size", 0.05)) };
   const target = rounded([position[0] + axis[0], position[1] + axis[1], position[2] + axis[2]]);
-  return { kind: "spot", ...point, target, inner: degrees("inner"), outer: degrees("outer"), ...(entry.size ? { size: round(number("size", 0)) } : {}) };
+  return { kind: "spot", ...point, target, inner: degrees("inner"), outer: degrees("outer"), ...(entry.size === undefined ? {} : { size: round(number("size", 0)) }) };
 }
 
 function areaOf(position: Triple, u: Triple, v: Triple, a0: number, common: { on: boolean; color: string; intensity: number }): LightState {

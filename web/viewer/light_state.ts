@@ -171,8 +171,8 @@ export function linearColor(light: Common): Triple {
 }
 
 /**
- * The library's light; undefined where it is off, or its environment map has not been dropped yet. @throws SrbfError on invalid numbers, and on a profile
- * that is not among `profiles`.
+ * The library's light; undefined where it is off, or its environment map has not been dropped yet. One whose profile is not among `profiles` shines
+ * without it. @throws SrbfError on invalid numbers.
  */
 export function lightOf(state: LightState, environments: ReadonlyMap<string, Environment>, profiles: ReadonlyMap<string, Profile> = new Map()): Light | undefined {
   if (!state.on) return undefined;
@@ -193,10 +193,8 @@ export function lightOf(state: LightState, environments: ReadonlyMap<string, Env
 }
 
 function shapeOf({ profile, direction, roll = 0 }: PointLight, profiles: ReadonlyMap<string, Profile>): { profile?: Profile; direction?: Triple; roll?: number } {
-  if (profile === undefined) return {};
-  const found = profiles.get(profile);
-  if (!found) throw new SrbfError(`expected a profile of this asset (${[...profiles.keys()].join(", ") || "which has none"}), found ${JSON.stringify(profile)}`);
-  return { profile: found, direction, roll: (roll * Math.PI) / 180 };
+  const found = profile === undefined ? undefined : profiles.get(profile);
+  return found ? { profile: found, direction, roll: (roll * Math.PI) / 180 } : {};
 }
 
 /** The two sides of an area, m. */

@@ -38,9 +38,9 @@ export interface PanelFacts {
   /** Where a new light goes; above the receivers unless given. */
   middle?: Triple;
   hasDirect: boolean;
-  /** Of suns that do not say their own, degrees. */
+  /** Of suns without an angle of their own, degrees. */
   sunAngle: number;
-  /** What lights may be shaped by, by name. */
+  /** Profiles that lights may have, by name. */
   profiles: ReadonlyMap<string, Profile>;
   /** Names of all assets. */
   assets: string[];
@@ -287,8 +287,10 @@ export class Panel {
 
   /** What shapes a light, and how it is turned; images are for spots alone. */
   private profile(folder: GUI, light: PointLightState): void {
-    const names = [...this.facts.profiles].flatMap(([name, { projected }]) => (projected && light.kind !== "spot" ? [] : [name]));
-    if (names.length === 0) return;
+    const fits = ({ projected }: Profile) => !projected || (light.kind === "spot" && light.outer < 90);
+    const known = [...this.facts.profiles].flatMap(([name, profile]) => (fits(profile) ? [name] : []));
+    const names = new Set(light.profile === undefined ? known : [...known, light.profile]);
+    if (names.size === 0) return;
     const proxy = {
       get profile() {
         return light.profile ?? "";
@@ -304,7 +306,7 @@ export class Panel {
       },
     };
     const chosen = () => this.actions.changed({ lights: true, panel: true });
-    folder.add(proxy, "profile", { None: "", ...Object.fromEntries(names.map((name) => [name, name])) }).name("Profile").onChange(chosen);
+    folder.add(proxy, "profile", { None: "", ...Object.fromEntries([...names].map((name) => [name, name])) }).name("Profile").onChange(chosen);
     if (light.profile !== undefined) folder.add(proxy, "turn", -180, 180, 1).name("Turn of the profile (°)").onChange(this.relight);
   }
 
@@ -332,8 +334,8 @@ export class Panel {
     if (light.kind !== "area") {
       folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
       folder.add(light, "radius", 0.0001, radius, 0.0001).name(light.kind === "sphere" ? "Least distance (m)" : "Radius (m)").onChange(this.relight);
+      this.profile(folder, light);
     }
-    if (light.kind !== "area") this.profile(folder, light);
     if (light.kind === "sphere") folder.add(light, "size", step, radius, step).name("Size (m)").onChange(this.relight);
     if (light.kind === "spot" && this.facts.hasDirect) {
       const proxy = {
@@ -341,7 +343,7 @@ export class Panel {
           return light.size ?? 0;
         },
         set size(value: number) {
-          light.size = value || undefined;
+          light.size = value;
         },
       };
       folder.add(proxy, "size", 0, radius, step).name("Size (m)").onChange(this.relight);

@@ -7,7 +7,7 @@ import directFragment from "../../glsl/stages/direct_point.frag";
 import shadowVertex from "../../glsl/stages/point_shadow.vert";
 import heightFragment from "../../glsl/stages/point_shadow_nearness.frag";
 import transmittanceFragment from "../../glsl/stages/point_shadow_transmittance.frag";
-import { type AreaLight, pointLightUniforms, type PunctualLight, type Triple } from "../src";
+import { type AreaLight, pointLightUniforms, type PunctualLight, type SpotLight, type Triple } from "../src";
 import { profileLook } from "../src/point_light";
 import { floatTexture } from "../src/three/float_textures";
 import { ProfileTextures } from "../src/three/profile_textures";
@@ -22,7 +22,8 @@ const COARSE = 512; // of one of several looks
 const GUARD = 3; // texels past a face's edge, for filtering across it
 const WIDEST = (60 * Math.PI) / 180; // half-angle of a spot that one map holds
 const GRID = 4; // looks per side of an area
-const [SPHERE_LOOKS, CONE_LOOKS] = [12, 32]; // of a sphere by a cube each, of a spot with a size by a map each
+const SPHERE_LOOKS = looks(12); // a cube each
+const CONE_LOOKS = looks(32); // of a spot with a size, a map each
 const NEAREST = 1e-3; // meters: what is nearer casts no shadow
 const FACES: readonly (readonly [Triple, Triple, Triple])[] = [0, 1, 2].flatMap((axis) =>
   [1, -1].map((sign) => {
@@ -51,7 +52,7 @@ export class PointShadows {
     partUp: { value: [0, 0, 0] as number[] },
     sphere: { value: [0, 0, 0, 0] as number[] },
     sphereLook: { value: 0 },
-    sphereLooks: { value: SPHERE_LOOKS },
+    sphereLooks: { value: SPHERE_LOOKS.length },
   };
   private readonly profiles = new ProfileTextures();
   private readonly fine: ShadowMaps;
@@ -87,17 +88,22 @@ export class PointShadows {
       [uniforms.partAcross.value, uniforms.partUp.value] = [u, v].map((side) => side.map((x) => x / GRID));
       for (const place of places) this.cube(sum, { ...base, position: place, color: shared(color, places.length) }, COARSE, 1);
     } else if ("size" in light && light.size) {
-      const places = looks(light.position, light.size, light.kind === "spot" && light.outer <= WIDEST ? CONE_LOOKS : SPHERE_LOOKS);
+      const { position: middle, size } = light;
+      const places = (isNarrow(light) ? CONE_LOOKS : SPHERE_LOOKS).map((look) => look.map((x, k) => middle[k] + size * x) as unknown as Triple);
       uniforms.sphereLooks.value = places.length;
       uniforms.sphere.value = [...light.position.map((x, k) => x - this.center[k]), light.size];
       places.forEach((position, i) => {
         uniforms.sphereLook.value = i;
         const color = shared(light.color, places.length);
-        if (light.kind === "spot") this.spot(sum, { ...light, position, color }, COARSE);
-        else this.cube(sum, { ...light, kind: "point", position, color }, COARSE);
+        this.shine(sum, { ...light, position, color }, COARSE);
       });
-    } else if (light.kind === "spot") this.spot(sum, light, FINE);
-    else this.cube(sum, light, FINE);
+    } else this.shine(sum, light, FINE);
+  }
+
+  /** One place: by one map of a narrow cone, by a cube otherwise. */
+  private shine(sum: WebGLRenderTarget, light: PunctualLight, size: number): void {
+    if (isNarrow(light)) this.cone(sum, light, size);
+    else this.cube(sum, light, size);
   }
 
   private cube(sum: WebGLRenderTarget, light: PunctualLight, size: number, lambertian = 0): void {
@@ -107,12 +113,7 @@ export class PointShadows {
     });
   }
 
-  /** One map of the cone, or a cube where it is wide. */
-  private spot(sum: WebGLRenderTarget, light: Extract<PunctualLight, { kind: "spot" }>, size: number): void {
-    if (light.outer > WIDEST) {
-      this.cube(sum, light, size);
-      return;
-    }
+  private cone(sum: WebGLRenderTarget, light: SpotLight, size: number): void {
     const right = across(light.direction);
     this.look(light, [right, cross(light.direction, right), light.direction], (Math.tan(light.outer) * size) / (size - 2 * GUARD), -1, 0);
     (size === FINE ? this.fine : this.coarse).add(sum, light.color);
@@ -136,15 +137,17 @@ export class PointShadows {
 
 const shared = (color: Triple, count: number) => color.map((x) => x / count) as unknown as Triple;
 
-/** Places in a sphere that fill its disc evenly from wherever it is seen. */
-function looks([x, y, z]: Triple, radius: number, count: number): Triple[] {
+const isNarrow = (light: PunctualLight): light is SpotLight => light.kind === "spot" && light.outer <= WIDEST;
+
+/** Places in a unit sphere that fill its disc evenly from wherever it is seen. */
+function looks(count: number): Triple[] {
   const golden = (Math.sqrt(5) - 1) / 2;
   return Array.from({ length: count }, (_, i) => {
-    const away = radius * depth((0.5 + i * golden) % 1);
+    const away = depth((0.5 + i * golden) % 1);
     const height = 1 - (2 * i + 1) / count;
     const turn = i * Math.PI * (3 - Math.sqrt(5));
     const flat = Math.sqrt(1 - height * height);
-    return [x + away * flat * Math.cos(turn), y + away * flat * Math.sin(turn), z + away * height];
+    return [away * flat * Math.cos(turn), away * flat * Math.sin(turn), away * height];
   });
 }
 

@@ -20,8 +20,8 @@ export function saveFrames(name: string, frames: readonly (readonly LightState[]
 }
 
 /** A script that makes the lights in Blender, or sets those that the scene has. */
-export function saveRig(name: string, lights: readonly LightState[], designed: Designed = []): void {
-  download(name, new Blob([blenderRig(lights, designed)], { type: "text/x-python" }));
+export function saveRig(name: string, lights: readonly LightState[], sunAngle: number, designed: Designed = []): void {
+  download(name, new Blob([blenderRig(lights, sunAngle, designed)], { type: "text/x-python" }));
 }
 
 /** A frame of FRAMES.json. */
@@ -32,7 +32,6 @@ export function frameOf(lights: readonly LightState[], designed: Designed = []):
   const off = [...new Set(known.filter((one): one is string => one !== undefined && !shown.has(one)))];
   return { lights: [...shining].map((light) => entry(light, designed)), ...(off.length ? { off } : {}) };
 }
-
 
 /** A light as srbf/schemas/frames.schema.json has it; an environment's file must lie beside FRAMES.json. */
 function entry(light: LightState, designed: Designed): Record<string, unknown> {
@@ -53,7 +52,7 @@ function values(light: LightState, color: Triple): Record<string, unknown> {
   if (light.kind === "sphere") return { kind: "sphere", position, size: light.size, ...fade };
   if (light.kind === "point") return { kind: "point", position, ...fade };
   const [inner, outer] = [(light.inner * Math.PI) / 180, (light.outer * Math.PI) / 180];
-  return { kind: "spot", position, direction: aim(light), inner, outer, ...(light.size ? { size: light.size } : {}), ...fade };
+  return { kind: "spot", position, direction: aim(light), inner, outer, ...(light.size === undefined ? {} : { size: light.size }), ...fade };
 }
 
 function download(name: string, blob: Blob): void {

@@ -1,9 +1,18 @@
 /** What the screen shows per texel: the relit picture, a coefficient map, or the difference to the reference; exposure, tone, false color. */
 import { Color, GLSL3, type IUniform, RawShaderMaterial, ShaderChunk, type Texture, Vector2, Vector4 } from "three";
 import type { SrbfTextures } from "../src/three";
+import type { State } from "./state";
 
 export const VALUES = { picture: 0, reference: 1, difference: 2, map: 3, negative: 4 } as const;
 export const COLORS = { linear: 0, agx: 1, aces: 2, magnitude: 3, signed: 4, negative: 5 } as const;
+
+/** What texels show of a state and in which colors; `comparing`: with a reference. */
+export function shownAs({ compare, show, tone }: State, comparing: boolean): { value: keyof typeof VALUES; color: keyof typeof COLORS } {
+  const value = comparing && compare !== "slider" && compare !== "off" ? compare : show === "map" && !comparing ? "map" : "picture";
+  if (value === "difference" || value === "map") return { value, color: "signed" };
+  if (show === "false color") return { value, color: "magnitude" };
+  return { value, color: show === "negative" && !comparing ? "negative" : tone };
+}
 
 export const BACKGROUND = new Color(0x0f1114);
 

@@ -95,7 +95,7 @@ export const firstPath = ({ lights }: State): State["path"] => (lights.some(({ k
 export function encodeState(state: State): string {
   const lights = state.lights.filter((light) => light.kind !== "named" || !isDesigned(light));
   const rounding = (_: string, value: unknown) => (typeof value === "number" ? round(value) : value);
-  return `#${encodeURIComponent(JSON.stringify({ ...state, lights }, rounding)).replace(/%(2C|3A|7B|7D|5B|5D|22)/g, (c) => (c === "%22" ? "'" : decodeURIComponent(c)))}`;
+  return `#${encodeURIComponent(JSON.stringify({ ...state, lights }, rounding)).replaceAll("'", "%27").replace(/%(2C|3A|7B|7D|5B|5D|22)/g, (c) => (c === "%22" ? "'" : decodeURIComponent(c)))}`;
 }
 
 /** The state in `hash`, with defaults from `plain`. @throws SrbfError in one line where it holds none. */

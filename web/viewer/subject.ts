@@ -16,7 +16,7 @@ export class Subject {
   readonly facts: AssetFacts;
   readonly asset: Asset;
   readonly coverage?: FloatImage;
-  /** Of its scene's own lights, by the names that they have for them. */
+  /** Of its scene's own lights, and of `--profile`, by the names that they have for them. */
   readonly profiles: ReadonlyMap<string, Profile>;
   /** The picture's alpha: a view's coverage, 1 everywhere for other assets. */
   readonly alpha: Texture;
@@ -45,6 +45,11 @@ export class Subject {
     } catch (error) {
       say(lineOf(error), "hint");
     }
+  }
+
+  /** How wide the discs of suns are that do not say it themselves, degrees. */
+  get sunAngle(): number {
+    return ((this.asset.manifest.direct?.sun_angle ?? 0) * 180) / Math.PI;
   }
 
   /** Whether its direct light can be added. */

@@ -3,7 +3,7 @@ import { NoToneMapping, WebGLRenderer } from "three";
 import { type Asset, type Light, lightDomainOf, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
-import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, redesign } from "./asset_lights";
+import { assetFacts, capturedPlaces, firstLights, inside, kindsOf, missingLine, outsideLine, redesign } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
 import { firstBall, roomOf } from "./ball_state";
@@ -15,9 +15,9 @@ import { droppedEnvironment, droppedFrames } from "./dropped";
 import type { Environment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
 import { History } from "./history";
-import { type DirectionalState, isAimed, isPlaced, lightOf, placedOf, type PlacedState, rounded, shiningOf, sunOf } from "./light_state";
+import { type DirectionalState, isAimed, isPlaced, lightOf, type LightState, placedOf, type PlacedState, rounded, shiningOf, sunOf } from "./light_state";
 import { listen, tabled } from "./keys";
-import type { Keyframes } from "./keyframes";
+import { FRAMES_PER_SECOND, type Keyframes } from "./keyframes";
 import { checkGpu, type Loaded } from "./loading";
 import { mapRange, showMap } from "./map_range";
 import { Measures } from "./measures";
@@ -27,15 +27,14 @@ import { Playback } from "./path";
 import { Receivers } from "./receivers";
 import { negated } from "./relighting";
 import { saveFrames, savePng, saveRig } from "./saving";
-import { COLORS, screenUniforms, VALUES } from "./screen";
+import { COLORS, screenUniforms, shownAs, VALUES } from "./screen";
 import { directionPoints, DirectionWidget } from "./direction_widget";
 import { Stage } from "./stage";
 import { type Changed, COMPARES, decodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
 import { type Subject, Subjects, weightsFor } from "./subject";
-import { emitting, emittingStates, paint, surfaceFacts } from "./surface_state";
+import { emitting, emittingStates, paint } from "./surface_state";
 import { Surroundings } from "./surroundings";
 
-const FRAMES_PER_SECOND = 24;
 const PACES = 15; // frames whose median is shown
 const ABOVE = 0.12; // of the distance to the eye: height of a point light above the picked place
 
@@ -114,8 +113,8 @@ export class Viewer {
         savePng(`${facts.title}.png`, this.stage.pixels(this.shining));
         changed();
       },
-      saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]], this.subject.asset.manifest.scene_lights),
-      saveRig: () => saveRig("lights.py", this.state.lights, this.subject.asset.manifest.scene_lights),
+      saveFrames: () => this.save([this.state.lights]),
+      saveRig: () => saveRig("lights.py", this.state.lights, this.subject.sunAngle, this.subject.asset.manifest.scene_lights),
       renderReference: () => void this.cycles?.render(this.state.lights),
       stopReference: () => this.cycles?.stop(),
       redesign: () => {
@@ -125,7 +124,7 @@ export class Viewer {
       undo: () => this.step(this.history.undo()),
       redo: () => this.step(this.history.redo()),
       loadFrames: () => pickFile(".json", (file) => void this.frames(file)),
-      savePath: () => this.savePath(),
+      savePath: () => this.save(this.state.path === "frames" && this.keyframes ? this.keyframes.frames : this.playback.frames(FRAMES_PER_SECOND)),
       resetCamera: () => {
         this.stage.resetCamera();
         changed();
@@ -160,12 +159,7 @@ export class Viewer {
 
   private panelFacts(): PanelFacts {
     return {
-      maps: this.subject.asset.tables.gather ? 0 : this.subject.maps,
-      kinds: kindsOf(this.subject.asset),
-      middle: middleOf(this.subject.asset),
-      hasDirect: this.subject.hasDirect,
-      sunAngle: (this.subject.asset.manifest.direct?.sun_angle ?? 0) * (180 / Math.PI),
-      profiles: this.subject.profiles,
+      ...assetFacts(this.subject),
       assets: this.loaded.facts.assets.map(({ name }) => name),
       hasMesh: this.stage.canShowMesh,
       hasScene: this.stage.canShowScene,
@@ -174,9 +168,6 @@ export class Viewer {
       named: this.named,
       hasFrames: this.keyframes !== undefined,
       cycles: this.cycles,
-      designed: (this.subject.asset.manifest.scene_lights ?? []).length > 0,
-      hasDisc: lightDomainOf(this.subject.asset.manifest) === "directions",
-      ...surfaceFacts(this.subject.asset),
       room: this.ball && roomOf(this.loaded.probes as Asset),
     };
   }
@@ -377,10 +368,8 @@ export class Viewer {
     const { state, uniforms } = this;
     const comparing = this.besideCycles || (state.compare !== "off" && this.comparison.compared >= 0);
     if (this.besideCycles) this.cycles?.show(uniforms);
-    const value = comparing && state.compare !== "slider" ? state.compare : state.show === "map" && !comparing ? "map" : "picture";
-    uniforms.value.value = VALUES[value as keyof typeof VALUES];
-    const signed = value === "difference" || value === "map";
-    const color = signed ? "signed" : state.show === "false color" ? "magnitude" : state.show === "negative" && !comparing ? "negative" : state.tone;
+    const { value, color } = shownAs(state, comparing);
+    uniforms.value.value = VALUES[value];
     uniforms.color.value = COLORS[color];
     const most = value === "map" ? mapRange(this.subject.asset, state.map) : 1;
     uniforms.toneMappingExposure.value = 2 ** state.exposure / most;
@@ -401,7 +390,7 @@ export class Viewer {
 
   private status(): void {
     const pace = this.paces.length < PACES ? undefined : [...this.paces].sort((a, b) => a - b)[PACES >> 1];
-    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace, missingLine(this.subject.asset), this.cycles?.told(this.state.lights, this.besideCycles));
+    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace, missingLine(this.subject, this.state.lights), this.cycles?.told(this.state.lights, this.besideCycles));
   }
 
   private events(changed: Changed): void {
@@ -473,7 +462,7 @@ export class Viewer {
   /** Play the frames of a file from now on. */
   private frames(file: File): Promise<void> {
     return this.slowly(async () => {
-      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear", [...this.subject.profiles.keys()]);
+      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear", this.subject.profiles);
       this.panel.setFacts(this.panelFacts());
     });
   }
@@ -495,8 +484,7 @@ export class Viewer {
     }
   }
 
-  private savePath(): void {
-    const frames = this.state.path === "frames" && this.keyframes ? this.keyframes.frames : this.playback.frames(FRAMES_PER_SECOND);
+  private save(frames: readonly (readonly LightState[])[]): void {
     saveFrames("FRAMES.json", frames.map((lights) => [...lights, ...emittingStates(this.subject.asset, this.state.surfaces)]), this.subject.asset.manifest.scene_lights);
   }
 }
