@@ -1,8 +1,9 @@
 """`python benchmarks/web_surfels.py ASSET…`: the lightmap that three.js draws of lights inside, against numpy's rays.
 
-Weights by passes of the GPU (shadow maps of 128, 256, 512 and 1024 texels per side of a face), by rays on the CPU, and by the table of
-places (rays for spots and areas): relative RMSE of the indirect light over all texels, at random free places. The page is that of the
-browser's tests: `npm run build:pages -- --outDir ../build/web/pages` in web/. Chromium is found on PATH, and runs SwiftShader.
+Weights by passes of the GPU (shadow maps of 128, 256, 512 and 1024 texels per side of a face), by those of WebGPU's nodes, by compute
+shaders, by rays on the CPU, and by the table of places (rays for spots and areas): relative RMSE of the indirect light over all texels,
+at random free places. Deep framebuffers have no table. The page is that of the browser's tests:
+`npm run build:pages -- --outDir ../build/web/pages` in web/. Chromium is found on PATH, and runs SwiftShader.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ ROOT = Path(__file__).resolve().parents[1]
 KINDS = {PointLight: "point", SpotLight: "spot", AreaLight: "area"}
 CASES: dict[str, dict[str, Any]] = {
     **{f"passes, {size}": {"weights": "gpu", "shadowSize": size} for size in (128, 256, 512, 1024)},
+    "nodes, 512": {"run": "nodes-lightmap", "backend": "webgpu", "weights": "gpu", "shadowSize": 512},
+    "nodes, 1024": {"run": "nodes-lightmap", "backend": "webgpu", "weights": "gpu", "shadowSize": 1024},
+    "compute, 1024": {"run": "nodes-lightmap", "backend": "webgpu", "weights": "compute", "shadowSize": 1024},
     "rays on the CPU": {"weights": "cpu", "exact": True},
     "table of places": {"weights": "cpu", "exact": False},
 }

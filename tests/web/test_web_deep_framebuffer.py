@@ -42,6 +42,8 @@ NAMES: dict[type[Light], str] = {
 RUNS = [
     *[{"run": "three-lightmap", "weights": weights} for weights in ("gpu", "cpu")],
     *[{"run": "nodes-lightmap", "weights": "cpu", "backend": backend} for backend in ("webgl", "webgpu")],
+    *[{"run": "nodes-lightmap", "weights": "gpu", "backend": backend} for backend in ("webgl", "webgpu")],
+    {"run": "nodes-lightmap", "weights": "compute", "backend": "webgpu"},
 ]
 
 
@@ -127,8 +129,8 @@ def divided_of(shiny: Asset) -> Asset:
     return replace(shiny, manifest={**shiny.manifest, "gather": gather}, tables={**shiny.tables, "pool": pool})
 
 
-@pytest.mark.parametrize("weights", ["gpu", "cpu"])
-def test_bright_surfels_light_as_in_numpy(browser: Any, divided: Asset, weights: str) -> None:
+@pytest.mark.parametrize("run", [run for run in RUNS if run.get("backend") is None or run["weights"] != "cpu"], ids=lambda run: "-".join(run.values()))
+def test_bright_surfels_light_as_in_numpy(browser: Any, divided: Asset, run: dict[str, str]) -> None:
     """Lights 3 cm off a wall, in a corner, and beside the wall with the door, behind which less than all is seen of what is bright."""
     places = ((0.03, 1.2, 0.9), (0.04, 0.05, 0.9), (1.47, 1.6, 0.5))
     sets: list[list[Light]] = [[PointLight(place, (1, 0.5, 0.2), falloff="inverse-square")] for place in places]
@@ -136,7 +138,7 @@ def test_bright_surfels_light_as_in_numpy(browser: Any, divided: Asset, weights:
     bare = without_near(divided)
     for bounces in (1, 12):
         limited = replace(divided, manifest={**divided.manifest, "gather": {**divided.manifest["gather"], "bounces": bounces}})
-        drawn = browser.lightmaps("three-lightmap", browser.serve(limited), [told(*lights) for lights in sets], weights=weights)
+        drawn = browser.lightmaps(asset=browser.serve(limited), light_sets=[told(*lights) for lights in sets], **run)
         for picture, lights in zip(drawn, sets, strict=True):
             expected = methods.relight(limited, lights)
             np.testing.assert_allclose(picture, expected, atol=CLOSE * expected.max(), err_msg=str(lights))
@@ -199,8 +201,8 @@ def test_an_environment_reaches_surfels_as_in_numpy(browser: Any, asset: Asset, 
 
 
 def test_nodes_name_what_the_gpu_does_not_compute_there(browser: Any, url: str) -> None:
-    said = browser.response("nodes-lightmap", asset=url, lightSets=[[]], weights="gpu", backend="webgl")
-    assert 'weights: "cpu"' in said["error"]
+    said = browser.response("nodes-lightmap", asset=url, lightSets=[[]], weights="compute", backend="webgl")
+    assert 'weights: "gpu"' in said["error"]
 
 
 @pytest.mark.parametrize(("key", "value"), [("gather", {"surfels": 0}), ("pool", None), ("scene", None)])

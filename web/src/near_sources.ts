@@ -29,7 +29,9 @@ export interface SendingCell {
   readonly cell: number;
   /** Numbers among the sources' surfels. */
   readonly members: readonly number[];
-  /** Their radiosity, as much as is seen by this cell. */
+  /** Which part of the light of each is sent by this cell. */
+  readonly shares: readonly number[];
+  /** Their radiosity, that part of it. */
   readonly light: readonly Triple[];
 }
 
@@ -41,6 +43,8 @@ export class NearPool {
   readonly normals: Float64Array;
   /** How far above receivers their shadows are looked up, m. */
   readonly lift: number;
+  /** Of all surfels, square meters. */
+  readonly area: number;
   /** Which surfels share their place with no other: translucent ones have a second one behind them. */
   private readonly alone: readonly boolean[];
   /** What the receivers see of cells. */
@@ -66,24 +70,27 @@ export class NearPool {
     this.places = row(0, cells.places);
     this.normals = row(1, cells.normals);
     this.lift = LIFT * extent(this.places);
+    this.area = cells.areas.reduce((sum, x) => sum + x, 0);
     const keys = Array.from({ length: cells.count }, (_, i) => cells.places.subarray(3 * i, 3 * i + 3).join());
     const counts = new Map<string, number>();
     for (const key of keys) counts.set(key, (counts.get(key) ?? 0) + 1);
     this.alone = keys.map((key) => counts.get(key) === 1);
   }
 
-  /** The surfels that are far brighter than the mean under a light of this `irradiance`, (S, 3), at a `place` (m), if it has one; undefined where none is. */
-  sources(irradiance: Float64Array, place?: Triple): NearSources | undefined {
+  /**
+   * The surfels that are far brighter than the mean under a light of this `irradiance`, (S, 3), at a `place` (m), if it has one; undefined where none is.
+   * `mean`: radiosity, where it is known.
+   */
+  sources(irradiance: Float64Array, place?: Triple, mean?: number): NearSources | undefined {
     const { areas, count } = this.cells;
     const first = (at: number) => this.albedo[at] * irradiance[at];
     const brightness = new Float64Array(count);
-    let [sum, area] = [0, 0];
+    let sum = 0;
     for (let i = 0; i < count; ++i) {
       brightness[i] = (first(3 * i) + first(3 * i + 1) + first(3 * i + 2)) / 3;
       sum += brightness[i] * areas[i];
-      area += areas[i];
     }
-    let least = (BRIGHT * sum) / Math.max(area, 1e-30);
+    let least = BRIGHT * (mean ?? sum / Math.max(this.area, 1e-30));
     let bright = [...brightness.keys()].filter((i) => brightness[i] > least);
     if (bright.length > MOST) {
       least = bright.map((i) => brightness[i]).sort((a, b) => b - a)[MOST];
@@ -94,12 +101,13 @@ export class NearPool {
     const parts = bright.map((i) => Math.min(1, brightness[i] / Math.max(least, 1e-30) - 1));
     const places = bright.map((i) => [...this.cells.places.subarray(3 * i, 3 * i + 3)] as unknown as Triple);
     const shares = this.near.seen(bright, places, bright.map((i) => brightness[i] * areas[i]), place);
-    const sending = new Map<number, { members: number[]; light: Triple[] }>();
+    const sending = new Map<number, { members: number[]; shares: number[]; light: Triple[] }>();
     shares.forEach((own, i) => {
       for (const [cell, share] of own) {
-        const sent = sending.get(cell) ?? { members: [], light: [] };
+        const sent = sending.get(cell) ?? { members: [], shares: [], light: [] };
         sending.set(cell, sent);
         sent.members.push(i);
+        sent.shares.push(share * parts[i]);
         sent.light.push([0, 1, 2].map((c) => share * parts[i] * first(3 * bright[i] + c)) as unknown as Triple);
       }
     });

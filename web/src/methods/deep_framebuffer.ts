@@ -8,11 +8,10 @@ import type { Triple } from "../matrix";
 import { without } from "../near_sources";
 import { Occluders } from "../occluders";
 import { decodePng } from "../png";
+import { FAR } from "../received_light";
 import shader from "../shaders/deep_framebuffer.glsl";
 import { type Placed, placed } from "../surfels";
 import type { Fail, Method, Tables } from "./method";
-
-const FAR = 1e4; // meters: how far a distant light's shadow rays go
 
 export const deepFramebuffer: Method = {
   name: "deep-framebuffer",

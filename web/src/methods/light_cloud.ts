@@ -7,7 +7,7 @@ import { type LightValues, readLightValues, readTable, summed, type TableEntry }
 import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
 import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
-import { Cells } from "../received_light";
+import { Cells, FAR } from "../received_light";
 import { shapeWeights } from "../shape_weights";
 import { reflectanceOf, Surfaces, type SurfacesManifest, type SurfelReflection } from "../surface_changes";
 import { type Placed, placed, type Surfels } from "../surfels";
@@ -28,7 +28,6 @@ interface LightCloudManifest extends ComponentsManifest, PositionManifest, Surfa
   surfel_series?: TableEntry;
 }
 
-const FAR = 1e4; // meters: how far a distant light's shadow rays go
 
 export const lightCloud: Method = {
   name: "light-cloud",

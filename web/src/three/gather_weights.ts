@@ -167,7 +167,7 @@ export class GatherWeights {
 }
 
 /** Equal of lights that differ in color alone; undefined where an engine's shadow may have changed. */
-function keyOf(looks: readonly ShadowedLook[]): string | undefined {
+export function keyOf(looks: readonly ShadowedLook[]): string | undefined {
   return looks.some(({ shadow }) => shadow) ? undefined : JSON.stringify(looks.map((look) => ({ ...look, color: 1 })));
 }
 

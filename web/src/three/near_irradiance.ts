@@ -5,6 +5,7 @@
 import { type DataTexture, NearestFilter, RedFormat, type Texture, UnsignedByteType, type WebGLRenderer, WebGLRenderTarget } from "three";
 import { ACROSS, type Gather } from "../gather";
 import type { Triple } from "../matrix";
+import { NearSlots } from "../near_slots";
 import { ENTRIES, type NearPool, type SendingCell, without } from "../near_sources";
 import nearLight from "../shaders/near_light.glsl";
 import nearSeen from "../shaders/near_seen.glsl";
@@ -43,8 +44,7 @@ export class NearIrradiance {
   private readonly sources: DataTexture;
   private readonly textures: DataTexture[];
   private sets?: [surfels: Receivers, clusters: Receivers];
-  private slots = SLOTS;
-  private readonly kept = new Map<number, number>(); // slots of cells, those asked for last at the end
+  private slots = new NearSlots(SLOTS);
   private readonly read: Float32Array;
 
   /** `cells`: of the pool, as `direct` has them, in the pool's order: each is its own patch. */
@@ -91,9 +91,13 @@ export class NearIrradiance {
     renderer.setClearColor(0, 0);
     renderer.clear(true, false, false);
     let [second, clusters]: Texture[] = [this.far, blank.texture];
-    for (let start = 0; start < near.cells.length; start += this.slots) {
-      const sending = near.cells.slice(start, start + this.slots);
-      const count = this.setSources(near.surfels, sending, this.slotsOf(renderer, sending));
+    for (let start = 0; start < near.cells.length; start += this.slots.count) {
+      const sending = near.cells.slice(start, start + this.slots.count);
+      const slots = this.slots.of(
+        sending.map(({ cell }) => cell),
+        (cell, slot) => this.drawSeen(renderer, cell, slot),
+      );
+      const count = this.setSources(near.surfels, sending, slots);
       second = added(renderer, surfels, second, count);
       clusters = added(renderer, receivingClusters, clusters, count);
     }
@@ -133,29 +137,6 @@ export class NearIrradiance {
     return at;
   }
 
-  /** Where it is kept what receivers see of each cell; drawn for those that are new, in place of those not asked for longest. */
-  private slotsOf(renderer: WebGLRenderer, sending: readonly SendingCell[]): number[] {
-    const { kept } = this;
-    for (const { cell } of sending) {
-      const slot = kept.get(cell);
-      if (slot === undefined || !kept.delete(cell)) continue;
-      kept.set(cell, slot);
-    }
-    return sending.map(({ cell }) => {
-      const known = kept.get(cell);
-      if (known !== undefined) return known;
-      let slot = kept.size;
-      if (slot >= this.slots) {
-        const [oldest, own] = kept.entries().next().value as [number, number];
-        kept.delete(oldest);
-        slot = own;
-      }
-      kept.set(cell, slot);
-      this.drawSeen(renderer, cell, slot);
-      return slot;
-    });
-  }
-
   /** What all receivers see of a cell. */
   private drawSeen(renderer: WebGLRenderer, cell: number, slot: number): void {
     const light = this.pool.near.place(cell).map((x, k) => x - this.cells.middle[k]) as unknown as Triple;
@@ -171,7 +152,7 @@ export class NearIrradiance {
     if (!this.sets) {
       const { direct, cells, textures } = this;
       const rows = textures[0].image.height;
-      this.slots = Math.min(SLOTS, Math.floor(renderer.capabilities.maxTextureSize / Math.max(cells.height, rows)));
+      this.slots = new NearSlots(Math.min(SLOTS, Math.floor(renderer.capabilities.maxTextureSize / Math.max(cells.height, rows))));
       this.sets = [this.set(direct.places, direct.normals, cells.width, cells.height), this.set(textures[0], textures[1], ACROSS, rows)];
     }
     return this.sets;
@@ -179,7 +160,7 @@ export class NearIrradiance {
 
   private set(places: Texture, normals: Texture, width: number, rows: number): Receivers {
     const kind = { format: RedFormat, type: UnsignedByteType, magFilter: NearestFilter, minFilter: NearestFilter, depthBuffer: false };
-    const seen = new WebGLRenderTarget(width, rows * this.slots, kind);
+    const seen = new WebGLRenderTarget(width, rows * this.slots.count, kind);
     const own = { places: { value: places }, normals: { value: normals } };
     const looked = { nearness: { value: null }, light: { value: null }, lift: { value: this.pool.lift }, first: { value: 0 } };
     const lit = { seen: { value: seen.texture }, sources: { value: this.sources }, former: { value: null }, count: { value: 0 }, rows: { value: rows } };

@@ -9,7 +9,7 @@ import { multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues } from "../shader";
 import type { ShapeLights } from "../shape_weights";
 import { changeable } from "../surface_changes";
-import { looksOf, placed } from "../surfels";
+import { looksOf, type Placed, placed } from "../surfels";
 import { environmentOf } from "./environment";
 import { engineShadow, type ShadowedLook, type Shadowing } from "./engine_shadows";
 import { rowsOf, threeMatrix } from "./rows";
@@ -111,6 +111,11 @@ export class SceneAsset {
       const shadow = own && engineShadow(own, renderer, sceneFromAsset);
       return placed(inAssetFrame(this.asset, [light])).flatMap((one) => looksOf(one, middle).map((look) => ({ ...look, shadow })));
     });
+  }
+
+  /** The current lights that lay irradiance on cells, as `looks` has them. */
+  protected placed(): Placed[][] {
+    return this.currentLights().map((light) => placed(inAssetFrame(this.asset, [light])));
   }
 
   /** The objects that emit, and environments. */

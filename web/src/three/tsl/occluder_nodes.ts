@@ -7,13 +7,13 @@ import { cross, type Triple } from "../../matrix";
 import type { N } from "./nodes";
 
 const { dot, positionGeometry, uniform, varying, vec4 } = tsl as Record<string, N>;
-const NEAREST = 5e-3; // meters: what is nearer to a light casts no shadow
+const NEAREST = 5e-3; // meters
 
 export class OccluderNodes {
   readonly faces: readonly RenderTarget[];
   readonly far: RenderTarget;
   private readonly geometry = new BufferGeometry();
-  private readonly uniforms = { light: uniform(new Vector3()), across: uniform(new Vector3()), up: uniform(new Vector3()), ahead: uniform(new Vector3()) } as Record<string, N>;
+  private readonly uniforms = { light: uniform(new Vector3()), across: uniform(new Vector3()), up: uniform(new Vector3()), ahead: uniform(new Vector3()), nearest: uniform(NEAREST) } as Record<string, N>;
   private readonly near: Mesh;
   private readonly distant: Mesh;
   private readonly camera = new OrthographicCamera();
@@ -24,17 +24,18 @@ export class OccluderNodes {
     const target = (side: number) => new RenderTarget(side, side, { format: RedFormat, type: FloatType, magFilter: NearestFilter, minFilter: NearestFilter });
     this.faces = Array.from({ length: 6 }, () => target(size));
     this.far = target(4 * size);
-    const { light, across, up, ahead } = this.uniforms;
+    const { light, across, up, ahead, nearest } = this.uniforms;
     const away = positionGeometry.sub(light);
     const depth = dot(away, ahead);
-    this.near = this.mesh(vec4(dot(away, across), dot(away, up), depth.sub(NEAREST), depth), varying(depth).reciprocal());
+    this.near = this.mesh(vec4(dot(away, across), dot(away, up), depth.sub(nearest), depth), varying(depth).reciprocal());
     const height = dot(positionGeometry, ahead).add(2 * reach);
     this.distant = this.mesh(vec4(dot(positionGeometry, across).div(reach), dot(positionGeometry, up).div(reach), height.div(-4 * reach).add(1), 1), varying(height));
   }
 
-  /** Draw what a light at a place sees. */
-  drawNear(renderer: Renderer, place: Triple): void {
+  /** Draw what a light at a place sees. What is nearer to it than `nearest` (m) casts no shadow. */
+  drawNear(renderer: Renderer, place: Triple, nearest = NEAREST): void {
     this.uniforms.light.value.set(...place);
+    this.uniforms.nearest.value = nearest;
     this.faces.forEach((face, i) => {
       const k = i >> 1;
       const along = (axis: number, value = 1) => [0, 1, 2].map((c) => (c === axis % 3 ? value : 0));

@@ -12,9 +12,11 @@ import type { TargetOptions } from "../lightmap_pass";
 import type { MaterialOptions } from "../material";
 import { SceneAsset, sourceOf } from "../scene_asset";
 import { SrbfTextures } from "../textures";
+import { GatherNodes } from "./gather_nodes";
 import { NodeInputs } from "./inputs";
 import { applyLight } from "./material";
 import { type N, texelAt } from "./nodes";
+import { undisturbed } from "./passes";
 import { relit } from "./relit";
 import { SurfelNodes } from "./surfel_nodes";
 
@@ -39,7 +41,7 @@ export class SrbfRelightingNodes extends SceneAsset {
   protected drawings = 0;
   protected readonly inputs: NodeInputs;
   private readonly quad?: QuadMesh;
-  private readonly gpu?: SurfelNodes;
+  private readonly gpu?: SurfelNodes | GatherNodes;
   private drawn = "";
   private weighed = "";
 
@@ -50,7 +52,9 @@ export class SrbfRelightingNodes extends SceneAsset {
     const filter = this.source === "maps" ? (options.filter ?? "linear") : "nearest";
     this.textures = new SrbfTextures(asset, filter);
     const { weights = "cpu" } = options;
-    if (weights !== "cpu") this.gpu = new SurfelNodes(asset, options.shadowSize, weights === "compute");
+    const { gather } = asset.tables;
+    const computes = weights === "compute";
+    if (weights !== "cpu") this.gpu = gather ? new GatherNodes(gather, options.shadowSize, computes) : new SurfelNodes(asset, options.shadowSize, computes);
     this.inputs = new NodeInputs(asset, this.textures, filter, options.maxPointLights ?? 16, this.gpu?.weights);
     if (this.source === "lightmap") {
       this.target = lightmapTarget(asset, options);
@@ -114,14 +118,14 @@ export class SrbfRelightingNodes extends SceneAsset {
   }
 
   /** Draw the weights of the current lights, if they have changed; returns what they depend on, nothing where three's shadows may have changed. */
-  private drawWeights(gpu: SurfelNodes, renderer: Renderer | undefined): string {
+  private drawWeights(gpu: SurfelNodes | GatherNodes, renderer: Renderer | undefined): string {
     if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
     if (this.asset.tables.surfaces?.change) throw new SrbfError('expected the albedo of the bake for weights "gpu" of nodes, found objects that are repainted; take weights: "cpu"');
-    const looks = this.looks(renderer, gpu.middle).flat();
+    const lights = this.looks(renderer, gpu.middle);
     const shapes = this.shapeLights();
     gpu.setShapes(shapes);
-    const state = looks.some(({ shadow }) => shadow) ? "" : JSON.stringify([looks, shapeState(shapes)]);
-    if (!state || state !== this.weighed) gpu.draw(renderer, looks);
+    const state = lights.flat().some(({ shadow }) => shadow) ? "" : JSON.stringify([lights, shapeState(shapes)]);
+    if (!state || state !== this.weighed) undisturbed(renderer, () => gpu.draw(renderer, lights, this.placed()));
     this.weighed = state;
     return state;
   }

@@ -4,12 +4,14 @@ import * as tsl from "three/tsl";
 import { each } from "./inputs";
 import { type N, versine } from "./nodes";
 
-const { abs, clamp, dot, float, Fn, If, int, ivec2, length, max, mix, select, sqrt, textureLoad, uniform, vec2, vec3, vec4, screenCoordinate } = tsl as Record<string, N>;
+const { abs, atan, clamp, dot, float, floor, Fn, If, int, ivec2, length, max, min, mix, select, sqrt, textureLoad, textureSize, uniform, vec2, vec3, vec4, screenCoordinate } = tsl as Record<string, N>;
 
-const NEAR = 8; // sides of a cell, closer than which it is measured by PARTS x PARTS points
+const NEAR = 8; // sides of a cell, closer than which it is measured by PARTS x PARTS points;
+const [NEAR_CONE, WIDEST] = [64, 1.5]; // of a spot whose outer half-angle has a versine below that one, whose cone may end in it
 const PARTS = 4;
 const TILT = 0.25; // of the nearness of a cell: how much the depth of its plane may vary within one texel of a shadow map
 const SLACK = 1e-4;
+const EDGE = 0.1; // of the depth: what is nearer by more is another surface
 
 /** Uniforms of a look, and of its shadow map. */
 export function lookUniforms() {
@@ -27,6 +29,9 @@ export function lookUniforms() {
     reach: uniform(1),
     across: vector(),
     up: vector(),
+    profileAcross: vector(),
+    profileUp: vector(),
+    profileTangent: uniform(0),
   } as Record<string, N>;
 }
 
@@ -45,14 +50,14 @@ export interface OwnMaps {
 /** A node of how much of a light a lifted cell sees. */
 export type Visibility = (place: N, normal: N) => N;
 
-/** RGBA of the pass: what `former` holds, and the look's irradiance. */
-export function irradianceNode(u: Record<string, N>, cells: CellTextures, former: Texture, distant: boolean, visibility: Visibility): N {
+/** RGBA of the pass: what `former` holds, and the look's irradiance; `profile`: a texture node of it, where the light has one. */
+export function irradianceNode(u: Record<string, N>, cells: CellTextures, former: Texture, distant: boolean, visibility: Visibility, profile?: N): N {
   return Fn(() => {
     const at = ivec2(screenCoordinate).toVar();
     const cell = textureLoad(cells.places, at).toVar();
     const normal = textureLoad(cells.normals, at).xyz.toVar();
-    const amount = (distant ? max(dot(normal, u.light), 0) : fromPlace(u, cell, normal)).toVar();
-    If(amount.greaterThan(0), () => {
+    const amount = (distant ? vec3(max(dot(normal, u.light), 0)) : fromPlace(u, cell, normal, profile)).toVar();
+    If(dot(amount, vec3(1)).greaterThan(0), () => {
       const place = cell.xyz.add(normal.mul(cells.lift)).toVar();
       amount.mulAssign(visibility(place, normal));
     });
@@ -60,26 +65,62 @@ export function irradianceNode(u: Record<string, N>, cells: CellTextures, former
   })();
 }
 
-function fromPlace(u: Record<string, N>, cell: N, normal: N): N {
+/** `srbfCellIrradiance`, or with a profile `srbfProfiledIrradiance`: at the middle of a cell far away, else at 4 x 4 points of a square. */
+function fromPlace(u: Record<string, N>, cell: N, normal: N, profile?: N): N {
+  const part = (toward: N, least: N): N => {
+    const amount = falling(u, toward, normal, least);
+    return profile ? shapedBy(u, profile, toward.negate().toVar()).mul(amount) : vec3(amount);
+  };
   const toward = u.light.sub(cell.xyz).toVar();
   const least = cell.w.div(2 * Math.PI).toVar();
-  const amount = falling(u, toward, normal, least).toVar();
-  If(dot(toward, toward).lessThan(cell.w.mul(NEAR ** 2)), () => {
-    amount.assign(0);
-    const side = select(normal.z.greaterThanEqual(0), float(1), float(-1)).toVar(); // the frame of [Duff2017]
-    const a = float(-1).div(side.add(normal.z)).toVar();
-    const b = normal.x.mul(normal.y).mul(a).toVar();
-    const tangent = vec3(side.mul(normal.x).mul(normal.x).mul(a).add(1), side.mul(b), side.mul(normal.x).negate()).toVar();
-    const bitangent = vec3(b, normal.y.mul(normal.y).mul(a).add(side), normal.y.negate()).toVar();
+  const amount = part(toward, least).toVar();
+  const sides = select(u.versineOuter.lessThan(WIDEST), float(NEAR_CONE), float(NEAR));
+  If(dot(toward, toward).lessThan(cell.w.mul(sides.mul(sides))), () => {
+    amount.assign(vec3(0));
+    const [tangent, bitangent] = tangents(normal);
     each(PARTS, "s", (s) =>
       each(PARTS, "t", (t) => {
         const place = (i: N) => float(i).add(0.5).div(PARTS).sub(0.5).mul(sqrt(cell.w));
-        const part = toward.sub(tangent.mul(place(s))).sub(bitangent.mul(place(t))).toVar();
-        amount.addAssign(falling(u, part, normal, least.div(PARTS ** 2)).div(PARTS ** 2));
+        const there = toward.sub(tangent.mul(place(s))).sub(bitangent.mul(place(t))).toVar();
+        amount.addAssign(part(there, least.div(PARTS ** 2)).div(PARTS ** 2));
       }),
     );
   });
   return amount;
+}
+
+/** `srbfProfile`: the factor of a light's color in a direction from it, bilinear; the profile is about the look's axis. */
+function shapedBy(u: Record<string, N>, profile: N, away: N): N {
+  const [x, y, ahead] = [u.profileAcross, u.profileUp, u.axis].map((axis) => dot(away, axis).toVar());
+  const most = vec2(textureSize(profile, int(0))).sub(1).toVar();
+  const place = vec2(0).toVar();
+  const shines = float(1).toVar();
+  If(u.profileTangent.greaterThan(0), () => {
+    shines.assign(select(ahead.greaterThan(0), float(1), float(0)));
+    const side = vec2(x, y.negate()).mul(float(0.5).div(max(ahead, 1e-15).mul(u.profileTangent))).add(0.5);
+    place.assign(clamp(side.mul(most.add(1)).sub(0.5), vec2(0), most));
+  }).Else(() => {
+    const off = length(vec2(x, y)).toVar();
+    const onAxis = off.lessThanEqual(0);
+    const azimuth = select(onAxis, float(0), atan(x, y));
+    const polar = select(onAxis, select(ahead.lessThan(0), float(Math.PI), float(0)), atan(off, ahead));
+    place.assign(clamp(vec2(azimuth.div(2 * Math.PI).add(0.5), polar.div(Math.PI)).mul(most), vec2(0), most));
+  });
+  const low = ivec2(place).toVar();
+  const high = ivec2(min(vec2(low).add(1), most)).toVar();
+  const part = place.sub(vec2(low)).toVar();
+  const fetch = (column: N, row: N): N => textureLoad(profile, ivec2(column, row)).rgb;
+  const [top, bottom] = [low.y, high.y].map((row) => mix(fetch(low.x, row), fetch(high.x, row), part.x));
+  return mix(top, bottom, part.y).mul(shines);
+}
+
+/** Two unit vectors across a normal and each other [Duff2017]. */
+export function tangents(normal: N): [N, N] {
+  const side = select(normal.z.greaterThanEqual(0), float(1), float(-1)).toVar();
+  const a = float(-1).div(side.add(normal.z)).toVar();
+  const b = normal.x.mul(normal.y).mul(a).toVar();
+  const across = vec3(side.mul(normal.x).mul(normal.x).mul(a).add(1), side.mul(b), side.mul(normal.x).negate()).toVar();
+  return [across, vec3(b, normal.y.mul(normal.y).mul(a).add(side), normal.y.negate()).toVar()];
 }
 
 function falling(u: Record<string, N>, toward: N, normal: N, least: N): N {
@@ -101,19 +142,25 @@ function texelOf(place: N, size: number): { texel: N; middle: N } {
   return { texel, middle: vec2(middle.x, middle.y.negate()).toVar() };
 }
 
-/** The nearest surface at the texel that a lifted cell falls on, against the cell's plane at the texel's middle. */
-export const seenFromPlace = (u: Record<string, N>, { maps, size }: OwnMaps): Visibility => (place, normal) => {
-  const away = place.sub(u.light).toVar();
+/** Which of six faces about a place, in its axes, looks along `away`, and where it falls there, from -1 to 1. */
+function onCube(away: N) {
   const most = abs(away).toVar();
-  const k = select(most.x.greaterThanEqual(most.y).and(most.x.greaterThanEqual(most.z)), int(0), select(most.y.greaterThanEqual(most.z), int(1), int(2))).toVar();
-  const turned = (v: N) => select(k.equal(0), v.yzx, select(k.equal(1), v.zxy, v));
+  const axis = select(most.x.greaterThanEqual(most.y).and(most.x.greaterThanEqual(most.z)), int(0), select(most.y.greaterThanEqual(most.z), int(1), int(2))).toVar();
+  const turned = (v: N): N => select(axis.equal(0), v.yzx, select(axis.equal(1), v.zxy, v));
   const own = turned(away).toVar();
   const side = select(own.z.greaterThanEqual(0), float(1), float(-1)).toVar();
   const depth = abs(own.z).toVar();
-  const { texel, middle } = texelOf(own.xy.div(depth), size);
+  const face = axis.mul(2).add(select(side.lessThan(0), int(1), int(0))).toVar();
+  return { face, side, depth, turned, at: own.xy.div(depth) as N };
+}
+
+/** The nearest surface at the texel that a lifted cell falls on, against the cell's plane at the texel's middle. */
+export const seenFromPlace = (u: Record<string, N>, { maps, size }: OwnMaps): Visibility => (place, normal) => {
+  const away = place.sub(u.light).toVar();
+  const { face, side, depth, turned, at } = onCube(away);
+  const { texel, middle } = texelOf(at, size);
   const plane = dot(turned(normal), vec3(middle, side)).div(dot(normal, away));
   const limited = clamp(plane, float(1 - TILT).div(depth), float(1 + TILT).div(depth));
-  const face = k.mul(2).add(select(side.lessThan(0), int(1), int(0))).toVar();
   const nearness = float(0).toVar();
   maps.forEach((map, i) => {
     If(face.equal(i), () => {
@@ -122,6 +169,36 @@ export const seenFromPlace = (u: Record<string, N>, { maps, size }: OwnMaps): Vi
   });
   return select(nearness.greaterThan(limited.mul(1 + SLACK)), float(0), float(1));
 };
+
+/** The nearest surfaces about a lifted cell whose plane is not known: its normal is a mean over several faces. */
+export const seenAround = (u: Record<string, N>, { maps, size }: OwnMaps): Visibility => (place) => {
+  const { face, depth, at } = onCube(place.sub(u.light).toVar());
+  const visible = float(0).toVar();
+  maps.forEach((map, i) => {
+    If(face.equal(i), () => {
+      visible.assign(surfelVisibility(map, size, at, depth.reciprocal()));
+    });
+  });
+  return visible;
+};
+
+export const seenAlong = (u: Record<string, N>, { maps, size }: OwnMaps): Visibility => (place) =>
+  surfelVisibility(maps[0], size, vec2(dot(place, u.across), dot(place, u.up)).div(u.reach), dot(place, u.light).add(u.reach.mul(2)));
+
+/** `srbfSurfelVisibility`: `at` from -1 to 1, `own`: what the map holds of the place itself. */
+function surfelVisibility(map: Texture, size: number, at: N, own: N): N {
+  const texel = vec2(at.x, at.y.negate()).mul(0.5 * size).add(0.5 * (size - 1)).toVar();
+  const base = clamp(floor(texel), vec2(0), vec2(size - 2)).toVar();
+  const part = texel.sub(base).toVar(); // past the middles of the outermost texels the plane goes on
+  const [nearer, excess] = [float(0).toVar(), float(0).toVar()];
+  for (const [x, y] of [[0, 0], [1, 0], [0, 1], [1, 1]]) {
+    const share = (x ? part.x : part.x.oneMinus()).mul(y ? part.y : part.y.oneMinus()).toVar();
+    const above = max(textureLoad(map, ivec2(base).add(ivec2(x, y))).r.div(own).sub(1), -EDGE).toVar();
+    nearer.addAssign(select(above.greaterThan(EDGE), share, float(0)));
+    excess.addAssign(share.mul(above));
+  }
+  return select(nearer.notEqual(0), clamp(nearer.oneMinus(), 0, 1), select(excess.greaterThan(SLACK), float(0), float(1)));
+}
 
 export const seenFromFar = (u: Record<string, N>, { maps, size }: OwnMaps): Visibility => (place, normal) => {
   const { texel, middle } = texelOf(vec2(dot(place, u.across), dot(place, u.up)).div(u.reach), size);

@@ -1,16 +1,14 @@
 /** The asset's tables as compute shaders, for WebGPU: from the mean irradiance on patches to the weights, a workgroup per row of a table. */
-import { type DataTexture, FloatType, NearestFilter, type RenderTarget, type Texture } from "three";
+import type { DataTexture, RenderTarget, Texture } from "three";
 import * as tsl from "three/tsl";
-import { type Renderer, StorageTexture } from "three/webgpu";
-import { SrbfError } from "../../errors";
+import type { Renderer, StorageTexture } from "three/webgpu";
 import type { LightValues } from "../../light_values";
 import { each } from "./inputs";
+import { compute, floatStorage, summingKernel, THREADS } from "./kernels";
 import type { N } from "./nodes";
 import { entryProduct, folded, type Numbers } from "./table_nodes";
 
-const { Fn, If, int, invocationLocalIndex, textureLoad, textureStore, uvec2, vec3, vec4, workgroupArray, workgroupBarrier, workgroupId } = tsl as Record<string, N>;
-
-const THREADS = 64; // of a workgroup, which share a row
+const { int, textureLoad, vec3, workgroupId } = tsl as Record<string, N>;
 
 /** A table, its texture, what is added to its sums, and the sides of what it makes. */
 export interface Stage {
@@ -35,8 +33,8 @@ export class TableCompute {
   constructor(stages: readonly Stage[], received: RenderTarget) {
     let numbers: Numbers = received;
     for (const stage of stages) {
-      const made = storage(stage.width, stage.height);
-      this.kernels.push({ node: rowsNode(stage, numbers, made).computeKernel([THREADS]), rows: stage.values.functions, made });
+      const made = floatStorage(stage.width, stage.height);
+      this.kernels.push({ node: rowsNode(stage, numbers, made), rows: stage.values.functions, made });
       numbers = { texture: made, width: stage.width };
     }
   }
@@ -48,8 +46,7 @@ export class TableCompute {
 
   /** @throws SrbfError on a renderer without compute shaders. */
   run(renderer: Renderer): void {
-    if (!(renderer.backend as { isWebGPUBackend?: boolean }).isWebGPUBackend) throw new SrbfError('expected WebGPU for weights "compute", found its WebGL2 backend; take weights: "gpu"');
-    for (const { node, rows } of this.kernels) (renderer as N).compute(node, [rows, 1, 1]);
+    for (const { node, rows } of this.kernels) compute(renderer, node, [rows, 1, 1]);
   }
 
   dispose(): void {
@@ -60,35 +57,17 @@ export class TableCompute {
   }
 }
 
-/** Every thread adds up each 64th entry of its row; then halves of the threads' sums are added to the others, again and again. */
+/** Every thread adds up each 64th entry of its row. */
 function rowsNode({ values, texture, scale, added, width }: Stage, numbers: Numbers, made: StorageTexture): N {
   const { count } = values;
-  return Fn(() => {
-    const sums = workgroupArray("vec3", THREADS);
-    const row = int(workgroupId.x).toVar();
-    const thread = int(invocationLocalIndex).toVar();
+  const row = () => int(workgroupId.x);
+  const part = (_: N, thread: N): N => {
     const total = vec3(0).toVar();
     each(int(count + THREADS - 1).sub(thread).div(THREADS).toVar(), "i", (i) => {
       const column = i.mul(THREADS).add(thread).toVar();
-      total.addAssign(entryProduct(values, texture, numbers, row, column));
+      total.addAssign(entryProduct(values, texture, numbers, row(), column));
     });
-    sums.element(thread).assign(total);
-    workgroupBarrier();
-    for (let half = THREADS / 2; half >= 1; half /= 2) {
-      If(thread.lessThan(half), () => sums.element(thread).addAssign(sums.element(thread.add(half))));
-      workgroupBarrier();
-    }
-    If(thread.equal(0), () => {
-      const at = folded(row, width).toVar();
-      textureStore(made, uvec2(at), vec4(sums.element(int(0)).mul(scale).add(textureLoad(added, at).rgb), 1)).toWriteOnly();
-    });
-  })();
-}
-
-function storage(width: number, height: number): StorageTexture {
-  const made = new StorageTexture(width, height);
-  made.type = FloatType;
-  made.magFilter = made.minFilter = NearestFilter;
-  made.generateMipmaps = false;
-  return made;
+    return total;
+  };
+  return summingKernel(made, () => folded(row(), width), part, (sum, at) => sum.mul(scale).add(textureLoad(added, at).rgb));
 }
