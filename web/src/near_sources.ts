@@ -43,8 +43,6 @@ export class NearPool {
   readonly normals: Float64Array;
   /** How far above receivers their shadows are looked up, m. */
   readonly lift: number;
-  /** Of all surfels, square meters. */
-  readonly area: number;
   /** Which surfels share their place with no other: translucent ones have a second one behind them. */
   private readonly alone: readonly boolean[];
   /** What the receivers see of cells. */
@@ -70,27 +68,24 @@ export class NearPool {
     this.places = row(0, cells.places);
     this.normals = row(1, cells.normals);
     this.lift = LIFT * extent(this.places);
-    this.area = cells.areas.reduce((sum, x) => sum + x, 0);
     const keys = Array.from({ length: cells.count }, (_, i) => cells.places.subarray(3 * i, 3 * i + 3).join());
     const counts = new Map<string, number>();
     for (const key of keys) counts.set(key, (counts.get(key) ?? 0) + 1);
     this.alone = keys.map((key) => counts.get(key) === 1);
   }
 
-  /**
-   * The surfels that are far brighter than the mean under a light of this `irradiance`, (S, 3), at a `place` (m), if it has one; undefined where none is.
-   * `mean`: radiosity, where it is known.
-   */
-  sources(irradiance: Float64Array, place?: Triple, mean?: number): NearSources | undefined {
+  /** The surfels that are far brighter than the mean under a light of this `irradiance`, (S, 3), at a `place` (m), if it has one; undefined where none is. */
+  sources(irradiance: Float64Array, place?: Triple): NearSources | undefined {
     const { areas, count } = this.cells;
     const first = (at: number) => this.albedo[at] * irradiance[at];
     const brightness = new Float64Array(count);
-    let sum = 0;
+    let [sum, area] = [0, 0];
     for (let i = 0; i < count; ++i) {
       brightness[i] = (first(3 * i) + first(3 * i + 1) + first(3 * i + 2)) / 3;
       sum += brightness[i] * areas[i];
+      area += areas[i];
     }
-    let least = BRIGHT * (mean ?? sum / Math.max(this.area, 1e-30));
+    let least = (BRIGHT * sum) / Math.max(area, 1e-30);
     let bright = [...brightness.keys()].filter((i) => brightness[i] > least);
     if (bright.length > MOST) {
       least = bright.map((i) => brightness[i]).sort((a, b) => b - a)[MOST];

@@ -4,6 +4,7 @@ import type { FloatImage } from "./image";
 import { rgb } from "./light_values";
 import { type AreaLight, type DirectionalLight, type PunctualLight, unit } from "./lights";
 import { cross, type Triple } from "./matrix";
+import type { Occluders } from "./occluders";
 
 import { profileLook } from "./point_light";
 import type { EnvironmentDirections } from "./environment_directions";
@@ -14,11 +15,6 @@ export const SIDE = 4; // points per side of an area light
 const [NEAR, PARTS] = [8, 4]; // sides of a cell, closer than which it is measured by so many points a side;
 const [NEAR_CONE, WIDEST] = [64, -0.5]; // of a spot of a half-angle below one of that cosine, whose cone may end in it
 const SOFTNESS_MIN = 1e-6; // in cosine, of a spot's edge
-
-/** Whether something stands between a place and one that is further by (dx, dy, dz). */
-export interface Shadowing {
-  between(x: number, y: number, z: number, dx: number, dy: number, dz: number): boolean;
-}
 
 /** N cells of K patches: `cells.exr`. */
 export class Cells {
@@ -34,8 +30,8 @@ export class Cells {
   readonly owners: Int32Array;
   readonly patchAreas: Float64Array;
 
-  /** `image`: row 0 (x, y, z, area), row 1 (normal, patch); `lift`: a share of their extent unless given. @throws SrbfError on an image of another shape. */
-  constructor({ width, height, channels, data }: FloatImage, where: string, lift?: number) {
+  /** `image`: row 0 (x, y, z, area), row 1 (normal, patch). @throws SrbfError on an image of another shape. */
+  constructor({ width, height, channels, data }: FloatImage, where: string) {
     if (height !== 2 || channels !== 4) throw new SrbfError(`expected two rows of four numbers in ${where}, found ${width} x ${height} x ${channels}`);
     const n = (this.count = width);
     this.places = new Float64Array(3 * n);
@@ -54,29 +50,15 @@ export class Cells {
       this.areas[i] = data[4 * i + 3];
       this.owners[i] = Math.round(data[4 * (n + i) + 3]);
     }
-    this.lift = lift ?? (n ? OFFSET * Math.max(...most.map((x, k) => x - least[k])) : 0);
-    for (let i = 0; i < 3 * n; ++i) this.starts[i] = Math.fround(this.places[i] + this.lift * this.normals[i]);
+    const lift = (this.lift = n ? OFFSET * Math.max(...most.map((x, k) => x - least[k])) : 0);
+    for (let i = 0; i < 3 * n; ++i) this.starts[i] = Math.fround(this.places[i] + lift * this.normals[i]);
     this.patches = this.owners.reduce((largest, owner) => Math.max(largest, owner + 1), 0);
     this.patchAreas = new Float64Array(this.patches);
     this.owners.forEach((owner, i) => (this.patchAreas[owner] += this.areas[i]));
   }
 
-  /** Some of the cells, each a patch of its own. */
-  some(chosen: readonly number[]): Cells {
-    const { places, normals, areas, lift } = this;
-    const n = chosen.length;
-    const data = new Float32Array(8 * n);
-    chosen.forEach((from, to) => {
-      data.set(places.subarray(3 * from, 3 * from + 3), 4 * to);
-      data.set(normals.subarray(3 * from, 3 * from + 3), 4 * (n + to));
-      data[4 * to + 3] = areas[from];
-      data[4 * (n + to) + 3] = to;
-    });
-    return new Cells({ kind: "float", width: n, height: 2, channels: 4, data }, "cells", lift);
-  }
-
   /** Mean irradiance of every patch under a light in white, (n, 3), 0 past the K patches; `far`: how far a distant light's shadow rays go, m. */
-  under(light: PunctualLight | AreaLight | DirectionalLight | EnvironmentDirections, occluders: Shadowing, far: number, n = this.patches): Float64Array {
+  under(light: PunctualLight | AreaLight | DirectionalLight | EnvironmentDirections, occluders: Occluders, far: number, n = this.patches): Float64Array {
     if (light.kind === "environment-directions") {
       const out = new Float64Array(3 * n);
       for (const [direction, color] of light.directions) {
@@ -95,7 +77,7 @@ export class Cells {
   }
 
   /** Mean irradiance of every patch under a white point, spot or sphere light, (K,); `c`: which color of a profile; `known`: what cells see it. */
-  private underPoint(light: PunctualLight, occluders: Shadowing, c = 0, known = new Int8Array(this.count)): Float64Array {
+  private underPoint(light: PunctualLight, occluders: Occluders, c = 0, known = new Int8Array(this.count)): Float64Array {
     const shape = profileLook(light);
     const along = light.direction ?? [0, 0, -1];
     const out = new Float64Array(this.patches);
@@ -112,7 +94,7 @@ export class Cells {
   }
 
   /** Mean irradiance of every patch under a white one-sided Lambertian rectangle: the mean of a grid of its points. */
-  private underArea({ position, u, v, a0 }: AreaLight, occluders: Shadowing): Float64Array {
+  private underArea({ position, u, v, a0 }: AreaLight, occluders: Occluders): Float64Array {
     const out = new Float64Array(this.patches);
     const [fx, fy, fz] = unit(cross(u, v));
     for (let i = 0; i < SIDE ** 2; ++i) {
@@ -124,7 +106,7 @@ export class Cells {
   }
 
   /** Mean irradiance of every patch under a white directional light. */
-  private underDistant(direction: Triple, occluders: Shadowing, far: number): Float64Array {
+  private underDistant(direction: Triple, occluders: Occluders, far: number): Float64Array {
     const out = new Float64Array(this.patches);
     const [dx, dy, dz] = direction;
     for (let i = 0; i < this.count; ++i) {
@@ -143,7 +125,7 @@ export class Cells {
   private add(
     out: Float64Array,
     place: Triple,
-    occluders: Shadowing,
+    occluders: Occluders,
     strength: (squared: number, ux: number, uy: number, uz: number, least: number) => number,
     sides = NEAR,
     known = new Int8Array(this.count),

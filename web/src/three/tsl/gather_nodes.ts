@@ -1,15 +1,17 @@
 /**
  * `GatherWeights` for WebGPURenderer: the irradiance of a deep framebuffer's view clusters, and what lobes gather, by passes of nodes; on WebGPU the last of
- * them by compute shaders, where asked. Nothing is read back: the CPU finds bright surfels by few shadow rays.
+ * them by compute shaders, where asked. Nothing is read back: the CPU finds bright surfels by shadow rays of its own.
  */
 import type { DataTexture, RenderTarget, Texture } from "three";
 import { Vector3 } from "three";
 import * as tsl from "three/tsl";
 import type { Renderer, StorageTexture } from "three/webgpu";
-import { BrightSurfels } from "../../bright_surfels";
 import { SrbfError } from "../../errors";
 import { ACROSS, type Gather, weightRows } from "../../gather";
 import type { Triple } from "../../matrix";
+import type { NearSources } from "../../near_sources";
+import { Occluders } from "../../occluders";
+import { FAR } from "../../received_light";
 import type { ShapeLights } from "../../shape_weights";
 import { type PackedCells, packedCells, type Placed } from "../../surfels";
 import type { ShadowedLook } from "../engine_shadows";
@@ -34,7 +36,7 @@ export class GatherNodes {
   private readonly cells: PackedCells;
   private readonly direct: IrradianceNodes;
   private readonly near?: NearNodes;
-  private readonly bright?: BrightSurfels;
+  private occluders?: Occluders;
   /** Of the surfels, a texture node. */
   private readonly irradiance: N;
   private readonly textures: DataTexture[];
@@ -72,10 +74,7 @@ export class GatherNodes {
     const albedo = colors(gather.albedo);
     const specular = gather.specular && colors(gather.specular);
     this.textures = [albedo, ...(specular ? [specular] : [])];
-    if (gather.near) {
-      this.near = new NearNodes(gather.near, cells, this.direct, { albedo, irradiance: this.irradiance });
-      this.bright = new BrightSurfels(gather, gather.near);
-    }
+    if (gather.near) this.near = new NearNodes(gather.near, cells, this.direct, { albedo, irradiance: this.irradiance });
     const { exchange, view, gloss } = gather;
     this.links = { exchange: new LinkNodes(exchange), view: new LinkNodes(view), ...(gloss ? { gloss: new LinkNodes(gloss) } : {}) };
     this.radiosity = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
@@ -138,13 +137,20 @@ export class GatherNodes {
     const share = 1 / looks.length;
     const from = this.direct.draw(renderer, looks.map((look) => ({ ...look, color: look.factor ?? ([share, share, share] as Triple) })));
     this.irradiance.value = this.direct.sums[from].texture;
-    this.near?.draw(renderer, this.bright?.under({ ...light, color: [1, 1, 1] }));
+    this.near?.draw(renderer, this.bright(light));
     for (let term = 0; term < this.gather.terms; ++term) render(renderer, this.bounces[term < 3 ? term : 2 - (term % 2)]);
     if (this.gather.terms === 0) cleared(renderer, this.radiosity[0]);
     if (this.shown) render(renderer, this.shown);
     this.gatherings.get(gathered)?.(renderer);
     ++this.computed;
     return gathered;
+  }
+
+  /** The surfels that are far brighter than the mean under a light. */
+  private bright(light: Placed): NearSources | undefined {
+    const { near, surfels } = this.gather;
+    this.occluders ??= new Occluders(surfels.corners);
+    return near?.sources(surfels.cells.under(light, this.occluders, FAR, surfels.cells.count), "position" in light ? light.position : undefined);
   }
 
   /** A pass with its target, or a kernel with its texture. */

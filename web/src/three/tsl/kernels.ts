@@ -27,10 +27,13 @@ export function summingKernel(made: StorageTexture, texel: () => N, part: (at: N
   })().computeKernel([THREADS]);
 }
 
-/** @throws SrbfError on a renderer without compute shaders. */
 export function compute(renderer: Renderer, kernel: N, groups: readonly [number, number, number]): void {
-  if (!(renderer.backend as { isWebGPUBackend?: boolean }).isWebGPUBackend) throw new SrbfError('expected WebGPU for weights "compute", found its WebGL2 backend; take weights: "gpu"');
   (renderer as N).compute(kernel, groups);
+}
+
+/** @throws SrbfError on a renderer without compute shaders. */
+export function checkComputes(renderer: Renderer): void {
+  if (!(renderer.backend as { isWebGPUBackend?: boolean }).isWebGPUBackend) throw new SrbfError('expected WebGPU for weights "compute", found its WebGL2 backend; take weights: "gpu"');
 }
 
 export function floatStorage(width: number, height: number): StorageTexture {

@@ -14,6 +14,7 @@ import { SceneAsset, sourceOf } from "../scene_asset";
 import { SrbfTextures } from "../textures";
 import { GatherNodes } from "./gather_nodes";
 import { NodeInputs } from "./inputs";
+import { checkComputes } from "./kernels";
 import { applyLight } from "./material";
 import { type N, texelAt } from "./nodes";
 import { undisturbed } from "./passes";
@@ -42,6 +43,7 @@ export class SrbfRelightingNodes extends SceneAsset {
   protected readonly inputs: NodeInputs;
   private readonly quad?: QuadMesh;
   private readonly gpu?: SurfelNodes | GatherNodes;
+  private readonly computes: boolean;
   private drawn = "";
   private weighed = "";
 
@@ -53,8 +55,8 @@ export class SrbfRelightingNodes extends SceneAsset {
     this.textures = new SrbfTextures(asset, filter);
     const { weights = "cpu" } = options;
     const { gather } = asset.tables;
-    const computes = weights === "compute";
-    if (weights !== "cpu") this.gpu = gather ? new GatherNodes(gather, options.shadowSize, computes) : new SurfelNodes(asset, options.shadowSize, computes);
+    this.computes = weights === "compute";
+    if (weights !== "cpu") this.gpu = gather ? new GatherNodes(gather, options.shadowSize, this.computes) : new SurfelNodes(asset, options.shadowSize, this.computes);
     this.inputs = new NodeInputs(asset, this.textures, filter, options.maxPointLights ?? 16, this.gpu?.weights);
     if (this.source === "lightmap") {
       this.target = lightmapTarget(asset, options);
@@ -120,6 +122,7 @@ export class SrbfRelightingNodes extends SceneAsset {
   /** Draw the weights of the current lights, if they have changed; returns what they depend on, nothing where three's shadows may have changed. */
   private drawWeights(gpu: SurfelNodes | GatherNodes, renderer: Renderer | undefined): string {
     if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
+    if (this.computes) checkComputes(renderer);
     if (this.asset.tables.surfaces?.change) throw new SrbfError('expected the albedo of the bake for weights "gpu" of nodes, found objects that are repainted; take weights: "cpu"');
     const lights = this.looks(renderer, gpu.middle);
     const shapes = this.shapeLights();

@@ -44,7 +44,6 @@ export class TableCompute {
     return this.kernels[this.kernels.length - 1].made;
   }
 
-  /** @throws SrbfError on a renderer without compute shaders. */
   run(renderer: Renderer): void {
     for (const { node, rows } of this.kernels) compute(renderer, node, [rows, 1, 1]);
   }
