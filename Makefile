@@ -9,7 +9,7 @@ MINUTES ?= 9
 PAGE := srbf/viewer/page/index.html
 PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*.ts web/src/*/*) $(wildcard glsl/*/*.*)
 
-.PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check docs torture bench extension web clean
+.PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check docs site torture bench extension web clean
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml blender_bake/pyproject.toml scripts/debian-packages scripts/make-venv
@@ -73,6 +73,12 @@ check: setup-test
 docs: export NO_MKDOCS_2_WARNING = 1
 docs: setup-test
 	$(BIN)/mkdocs build --strict --quiet
+
+# The same with scenes that one relights in the browser, each one file; their demos take up to ten minutes each, and are kept.
+LIVE ?= loft caustics house
+site: setup-test $(PAGE)
+	$(BIN)/python -m scripts.live_pages $(LIVE)
+	$(MAKE) docs
 
 torture: setup-test
 	$(BIN)/python benchmarks/torture.py --minutes $(MINUTES)

@@ -15,6 +15,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parent.parent
+LIVE = ROOT / "build" / "live"
 # File of the repository -> its path on the site, beside those of docs/.
 BROUGHT_IN = {
     "DESIGN.md": "design.md",
@@ -31,11 +32,20 @@ FENCE = re.compile(r"^\s*```")
 ITEM = re.compile(r"(?:[-*]|\d+\.) ")
 
 
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Live scenes beside the front page, where scripts/live_pages.py has made them."""
+    if (LIVE / "live.md").is_file() and config.nav:
+        config.nav.insert(1, {"Live scenes": "live.md"})
+    return config
+
+
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are outside docs/."""
-    for source, target in BROUGHT_IN.items():
+    brought = {target: ROOT / source for source, target in BROUGHT_IN.items()}
+    live = {path.relative_to(LIVE).as_posix(): path for path in [LIVE / "live.md", *LIVE.glob("live/*.html")] if path.is_file()}
+    for target, path in (brought | live).items():
         if files.get_file_from_path(target) is None:
-            files.append(File.generated(config, target, abs_src_path=str(ROOT / source)))
+            files.append(File.generated(config, target, abs_src_path=str(path)))
     return files
 
 
