@@ -54,6 +54,14 @@ def view(
             show_default=False,
         ),
     ] = None,
+    environment: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="An environment map that lights may have on the page, EXR or a picture; the first one shines; may be given again.",
+            show_default=False,
+        ),
+    ] = None,
     port: Annotated[int, typer.Option(metavar="NUMBER", parser=PORT, help="On 127.0.0.1; 0: any that is free.")] = 0,
     save: Annotated[
         Path | None,
@@ -63,7 +71,7 @@ def view(
     browser: Annotated[bool, typer.Option(help="Open the page, or print its address only.")] = True,
 ) -> None:
     """Show an asset in the browser and move its lights; Ctrl-C ends it."""
-    from srbf.cli.light_arguments import read_profile
+    from srbf.cli.light_arguments import read_environment, read_profile
     from srbf.receiver_images import MANIFEST as CAPTURE_MANIFEST
     from srbf.viewer.contents import contents_of
 
@@ -85,10 +93,12 @@ def view(
         from srbf.viewer.cycles import CyclesRenders
 
         renders = CyclesRenders(Asset.open(assets[0]), scene, blender, profiles)
+    environments = [(path.name, read_environment(path)) for path in environment or ()]
+    contents = contents_of(assets, None if save else capture, mesh, probes, renders, profiles, environments)
     if save is not None:
-        _save(save, contents_of(assets, None, mesh, probes, profiles=profiles), capture, force)
-        return
-    serve(contents_of(assets, capture, mesh, probes, renders, profiles), port, browser, renders)
+        _save(save, contents, capture, force)
+    else:
+        serve(contents, port, browser, renders)
 
 
 def serve(contents: dict[str, Content], port: int = 0, browser: bool = True, renders: CyclesRenders | None = None) -> None:

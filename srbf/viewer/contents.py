@@ -12,8 +12,10 @@ from srbf.capture import Capture
 from srbf.channels import GLOSS
 from srbf.errors import InputError
 from srbf.io import files
+from srbf.io.image import float_exr
 from srbf.light_domain import domain_of_asset
 from srbf.light_profile import Profile
+from srbf.lights import EnvironmentLight
 from srbf.methods import method_of
 from srbf.viewer import light_tables, page_manifest
 from srbf.viewer.built_page import page_files
@@ -24,6 +26,7 @@ from srbf.viewer.site import shown_mesh
 
 CAPTURE = "capture/"
 PROBES = "probes/"
+UNDER_ENVIRONMENTS = ("directions", "pool")  # kinds of lights of assets that the page shows under environments
 
 Content = bytes | Path | Callable[[], bytes]
 
@@ -42,13 +45,15 @@ def contents_of(
     probes: Path | None = None,
     renders: CyclesRenders | None = None,
     profiles: Sequence[Profile] = (),
+    environments: Sequence[tuple[str, EnvironmentLight]] = (),
 ) -> dict[str, Content]:
     """All content that the page may request of the assets in `folders`; it shows the first one first, and a sphere lit by `probes`.
 
     `renders`: what the page may ask Cycles for. `profiles`: of files, which its lights may have beside those of the scene's own lights.
+    `environments`: maps by the names of their files; the first one shines.
 
-    InputError if they, or the capture, belong to different scenes, the probes to other lights, or where an asset takes no `profiles`; also
-    the errors of `Asset.open`, `Capture.open` and `page_files`.
+    InputError if they, or the capture, belong to different scenes, the probes to other lights, or where an asset takes no `profiles`
+    or `environments`, or two of them have one name; also the errors of `Asset.open`, `Capture.open` and `page_files`.
     """
     page = page_files()
     assets = [Asset.open(folder) for folder in folders]
@@ -57,6 +62,11 @@ def contents_of(
             raise InputError(f"expected an asset that the page shows, found {asset.method} in {folder}; `srbf relight` shows it")
         if profiles and not method_of(asset).takes_profiles:
             raise InputError(f"expected an asset of lights inside the scene for profiles, found {asset.method} in {folder}; leave them out")
+        if environments and domain_of_asset(asset.manifest).kind not in UNDER_ENVIRONMENTS:
+            raise InputError(
+                "expected an asset of distant lights or a deep framebuffer for an environment, "
+                f"found {asset.method} in {folder}; leave it out"
+            )
     _check_siblings(assets, folders)
     references = None
     if capture is not None:
@@ -79,6 +89,12 @@ def contents_of(
             raise InputError(f"expected profiles of different names, found two of {given.name}; rename the file")
         given_tables[given.name] = {"file": f"profile-{number}.exr", "projected": given.projected}
         contents[f"profile-{number}.exr"] = partial(light_tables.profile_table, given)
+    maps: dict[str, str] = {}
+    for number, (name, light) in enumerate(environments):
+        if name in maps:
+            raise InputError(f"expected environments of different names, found two of {name}; rename the file")
+        maps[name] = f"environment-{number}.exr"
+        contents[maps[name]] = partial(float_exr, light.image)
     told = []
     names = page_manifest.names(assets, folders)
     for i, (asset, folder, name) in enumerate(zip(assets, folders, names, strict=True)):
@@ -117,6 +133,7 @@ def contents_of(
         tuple(notes),
         PROBES if probed else None,
         None if renders is None else renders.facts(),
+        maps,
     )
     if renders is not None:
         contents |= {f"{PLACE}/status.json": renders.status, f"{PLACE}/image.exr": renders.image}

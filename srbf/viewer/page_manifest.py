@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,11 @@ def facts(
     notes: tuple[str, ...] = (),
     probes: str | None = None,
     cycles: dict[str, Any] | None = None,
+    environments: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """Of the first asset's receivers; `assets` as `described`; `capture`: where the page finds lights.json, as it would follow a link;
-    `probes`: the folder of an asset of probes; `cycles`: `CyclesRenders.facts`."""
+    `probes`: the folder of an asset of probes; `cycles`: `CyclesRenders.facts`; `environments`: where the page finds maps,
+    by their names."""
     view = asset.receiver_kind == "view"
     camera = fitted_camera(asset) if view else None
     return {
@@ -37,6 +39,7 @@ def facts(
         "capture": capture,
         "probes": probes,
         "cycles": cycles,
+        "environments": dict(environments or {}),
         "camera": None
         if camera is None
         else {"position": camera.position.tolist(), "rotation": camera.rotation.tolist(), "lens": camera.lens.tolist()},

@@ -6,7 +6,7 @@ import base64
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -19,7 +19,6 @@ import numpy as np
 import pytest
 from npm_package import WEB, browser_program, driven, npm, viewer_page
 
-from srbf.light_profile import Profile
 from srbf.viewer.contents import contents_of
 from srbf.viewer.server import ViewerServer
 
@@ -95,9 +94,9 @@ def serve(built: Path) -> Iterator[Callable[..., str]]:
         capture: Path | None = None,
         mesh: Path | None = None,
         probes: Path | None = None,
-        profiles: Sequence[Profile] = (),
+        **given: Any,
     ) -> str:
-        server = ViewerServer(contents_of(folder if isinstance(folder, list) else [folder], capture, mesh, probes, profiles=profiles))
+        server = ViewerServer(contents_of(folder if isinstance(folder, list) else [folder], capture, mesh, probes, **given))
         Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
         servers.append(server)
         return server.url

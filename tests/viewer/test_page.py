@@ -211,6 +211,27 @@ def test_an_environment_dropped_on_the_page_lights_it(chromium: Any, asset: Asse
     assert shows(chromium, asset, lights, exposure=-2)
 
 
+def test_given_environments_shine_from_the_start(chromium: Any, asset: Asset, built: Path, tmp_path: Path) -> None:
+    """The first of them, in one file; an address that names the second is no riddle."""
+    maps = [np.random.default_rng(seed).random((8, 16, 3)).astype(np.float32) for seed in (4, 5)]
+    asset.save(tmp_path / "asset")
+    flags = []
+    for i, pixels in enumerate(maps):
+        write_image(tmp_path / f"around {i}.exr", pixels, "float")
+        flags += ["--environment", str(tmp_path / f"around {i}.exr")]
+    page = tmp_path / "page.html"
+    done = CliRunner().invoke(app, ["view", str(tmp_path / "asset"), "--save", str(page), *flags])
+    assert done.exit_code == 0, done.output
+    chromium("open", url=page.as_uri() + PICTURE + ",'exposure':-2}", width=WIDTH, height=HEIGHT)
+    assert shows(chromium, asset, [EnvironmentLight(maps[0])], exposure=-2)
+    second = ",'exposure':-2,'lights':[{'kind':'environment','on':true,'color':'%23ffffff','intensity':1,'file':'around%201.exr'}]}"
+    chromium("open", url=page.as_uri() + PICTURE + second, width=WIDTH, height=HEIGHT)
+    assert shows(chromium, asset, [EnvironmentLight(maps[1])], exposure=-2)
+    again = CliRunner().invoke(app, ["view", str(tmp_path / "asset"), "--save", str(tmp_path / "b.html"), *flags[:2], *flags[:2]])
+    assert again.exit_code == 1
+    assert "two of around 0.exr" in again.output
+
+
 def write_radiance(path: Path, environment: np.ndarray) -> None:
     """Flat RGBE pixels [Ward1991]: mantissas that share an exponent."""
     exponent = np.ceil(np.log2(environment.max(axis=2)))

@@ -14,13 +14,18 @@ export async function droppedFrames(file: File, state: State, usual: "linear" | 
   return keyframes;
 }
 
-/** Add an environment map; the first one turns the other lights off. @throws SrbfError where the asset takes none, there are too many lights, or it cannot be read. */
+/** Add an environment map, as `shineEnvironment`. @throws SrbfError where the asset takes none, there are too many lights, or it cannot be read. */
 export async function droppedEnvironment(file: File, state: State, environments: Map<string, Environment>, takes: boolean): Promise<void> {
   if (!takes) throw new SrbfError("expected an asset of distant lights or a deep framebuffer for an environment, found one of other lights");
   environments.set(file.name, await readEnvironment(file));
+  shineEnvironment(file.name, state);
+}
+
+/** Select the light of an environment map, or add it; the first one turns the other lights off. @throws SrbfError where there are too many lights. */
+export function shineEnvironment(name: string, state: Pick<State, "lights" | "selected">): void {
   const { lights } = state;
-  const known = lights.findIndex((light) => light.kind === "environment" && light.file === file.name);
+  const known = lights.findIndex((light) => light.kind === "environment" && light.file === name);
   if (known < 0 && lights.length >= MOST_LIGHTS) throw new SrbfError(`expected at most ${MOST_LIGHTS} lights; remove one first`);
   if (known < 0 && !lights.some((light) => light.kind === "environment")) for (const light of lights) light.on = false;
-  state.selected = known < 0 ? lights.push(environmentState(file.name)) - 1 : known;
+  state.selected = known < 0 ? lights.push(environmentState(name)) - 1 : known;
 }

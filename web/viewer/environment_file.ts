@@ -16,16 +16,19 @@ export interface Environment {
 export async function readEnvironment(file: File): Promise<Environment> {
   const buffer = await file.arrayBuffer();
   const suffix = file.name.toLowerCase().split(".").pop();
-  if (suffix === "exr") {
-    const image = decodeFloat(buffer, file.name);
-    return rgb(image.width, image.height, image.channels, image.data);
-  }
+  if (suffix === "exr") return exrEnvironment(buffer, file.name);
   if (suffix === "hdr" || suffix === "pic") return readHdr(buffer, file.name);
   if (suffix === "png") {
     const image = decodePng(buffer, file.name);
     return rgb(image.width, image.height, image.channels, Float32Array.from(image.data, (byte) => byte / 255));
   }
   throw new SrbfError(`expected an environment as .exr, .hdr or .png, found ${file.name}; convert it first`);
+}
+
+/** @throws SrbfError on a damaged file. */
+export function exrEnvironment(buffer: ArrayBuffer, name: string): Environment {
+  const image = decodeFloat(buffer, name);
+  return rgb(image.width, image.height, image.channels, image.data);
 }
 
 const MANTISSA = 255 / 256; // three divides mantissas by 255, Radiance and OpenImageIO by 256

@@ -7,6 +7,7 @@ import { fetched } from "../src/files";
 import { insidePath } from "../src/manifest";
 import type { CyclesFacts } from "./cycles";
 import type { DirectInputs, ViewCamera } from "./direct_light";
+import { type Environment, exrEnvironment } from "./environment_file";
 import type { FittedCamera } from "./frames";
 import { References } from "./reference";
 
@@ -36,6 +37,8 @@ export interface Facts {
   camera: FittedCamera | null;
   /** Where the page may ask for renders. */
   cycles?: CyclesFacts | null;
+  /** Where environment maps are, by their names; the first one shines. */
+  environments?: Record<string, string>;
   notes: string[];
 }
 
@@ -57,6 +60,7 @@ export interface Loaded {
   references?: References;
   /** What lights the sphere that moves. */
   probes?: Asset;
+  environments: ReadonlyMap<string, Environment>;
   notes: string[];
 }
 
@@ -72,14 +76,16 @@ export async function loadFacts(): Promise<Facts> {
 /** @throws SrbfError in one line where a file is missing or damaged. */
 export async function load(facts: Facts, index: number, progress: (done: number, what: string) => void): Promise<Loaded> {
   const notes = [...facts.notes];
-  const [first, model, references, probes] = await Promise.all([
+  const maps = Object.entries(facts.environments ?? {}).map(async ([name, url]) => [name, exrEnvironment(await (await fetched(fetch.bind(window), url)).arrayBuffer(), name)] as const);
+  const [first, model, references, probes, environments] = await Promise.all([
     loadOne(facts.assets[index], progress),
     facts.mesh ? readModel(facts.mesh, notes) : undefined,
     facts.capture ? References.load(facts.capture) : undefined,
     facts.probes ? loadAsset(facts.probes, { verify: globalThis.isSecureContext, exact: true }) : undefined,
+    Promise.all(maps),
   ]);
   progress(1, "");
-  return { facts, first, model, references, probes, notes };
+  return { facts, first, model, references, probes, environments: new Map(environments), notes };
 }
 
 /** One of the assets. @throws SrbfError as `load`. */

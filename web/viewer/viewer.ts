@@ -11,7 +11,7 @@ import { bearing, legend, slider, statusLine, titles } from "./captions";
 import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { Cycles } from "./cycles";
-import { droppedEnvironment, droppedFrames } from "./dropped";
+import { droppedEnvironment, droppedFrames, shineEnvironment } from "./dropped";
 import type { Environment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
 import { History } from "./history";
@@ -58,7 +58,7 @@ export class Viewer {
   private keyframes?: Keyframes;
   private outside = "";
   private shining: Light[] = [];
-  private readonly environments = new Map<string, Environment>();
+  private readonly environments: Map<string, Environment>;
   private lightsChanged = true;
   private drawNeeded = true;
   private waiting = 0;
@@ -76,6 +76,7 @@ export class Viewer {
     renderer: WebGLRenderer,
   ) {
     const { facts, model, probes, references } = loaded;
+    this.environments = new Map(loaded.environments);
     this.renderer = renderer;
     this.subjects = subjects;
     this.subject = first;
@@ -205,6 +206,8 @@ export class Viewer {
     const { asset } = this.subject;
     const lights = firstLights(asset, this.receivers.bounds);
     const state = firstState(asset.manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels", lights);
+    const [environment] = this.loaded.environments.keys();
+    if (environment !== undefined && state.lights.length < MOST_LIGHTS) shineEnvironment(environment, state);
     if (this.loaded.probes) state.ball = firstBall(this.loaded.probes, lights?.find(isPlaced)?.position, this.receivers.bounds.radius);
     return state;
   }
