@@ -109,7 +109,7 @@ class Room:
             factor /= np.maximum(factor.sum(axis=1, keepdims=True), 1e-12)
         return factor
 
-    @cache  # noqa: B019: rooms are few
+    @cache  # noqa: B019  (rooms are few)
     def transport(self) -> np.ndarray:
         """(N, N, 3): indirect irradiance at each cell per unit of irradiance on another, all bounces."""
         count, factor = len(self.places), self.factors()
@@ -140,6 +140,7 @@ class Room:
         direct = np.array([self.direct(place) for place in places], np.float32)
         return np.stack([direct @ transport.T for transport in np.moveaxis(self.transport(), 2, 0)], axis=2)
 
+    @cache  # noqa: B019  (rooms are few)
     def patches(self, count: int) -> np.ndarray:
         """The patch of each cell, as a bake chooses them."""
         cells = Cells(
