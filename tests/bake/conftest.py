@@ -21,13 +21,13 @@ sys.path.insert(0, str(ROOT / "benchmarks"))  # faults, for tests that put them 
 @pytest.fixture(scope="session")
 def blend(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """The .blend of a named scene of closed_form_scenes.py."""
-    return built("closed_form_scenes.py", tmp_path_factory.mktemp("scenes"))
+    return built("closed_form_scenes.py", tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """The .blend of a named scene of real_scenes.py."""
-    return built("real_scenes.py", tmp_path_factory.mktemp("real"))
+    return built("real_scenes.py", tmp_path_factory)
 
 
 LEANING = {"normal mapped"}  # scenes whose materials turn normals away from the surface, as their tests check

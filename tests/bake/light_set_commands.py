@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+from building import built
 from typer.testing import CliRunner, Result
 
 from srbf.cli import app
@@ -33,14 +33,6 @@ def refused(words: list[object], status: int = 1) -> str:
     return line
 
 
-def scenes_in(folder: Path) -> Callable[[str], Path]:
-    """The .blend of a scene of light_set_scenes.py, built when first asked for."""
-
-    def build(name: str) -> Path:
-        path = folder / f"{name}.blend"
-        if not path.exists():
-            script = Path(__file__).with_name("light_set_scenes.py")
-            subprocess.run([sys.executable, str(script), name, str(path)], check=True, capture_output=True, timeout=120)
-        return path
-
-    return build
+def scenes_in(factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The .blend of a scene of light_set_scenes.py."""
+    return built("../../tests/bake/light_set_scenes.py", factory)

@@ -36,7 +36,7 @@ OFF = 0.1  # m that held-out lights keep off surfaces
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))
+    return scenes_in(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")
