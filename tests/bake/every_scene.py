@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def main(script: str, folder: str) -> None:
-    """Call the script as a user does, once a scene."""
+    """Call the script as a user does, once for each scene."""
 
     def end(status: int) -> None:
         raise SystemExit(status)

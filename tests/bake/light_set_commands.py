@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from building import built
+from building import FEW, built
 from typer.testing import CliRunner, Result
 
 from srbf.cli import app
@@ -23,6 +24,12 @@ def done(*words: object) -> Result:
     result = srbf(*words)
     assert result.exit_code == 0, (result.output, result.exception)
     return result
+
+
+def of_a_process(*words: object) -> list[str]:
+    """The same command line for a process that can be killed."""
+    lines = [f"import srbf.{name.rpartition('.')[0]}; srbf.{name} = {few}" for name, few in FEW.items()]
+    return [sys.executable, "-c", "; ".join([*lines, "from srbf.cli import app", "app()"]), *map(str, words)]
 
 
 def refused(words: list[object], status: int = 1) -> str:

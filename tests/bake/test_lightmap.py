@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Baked
 
 from srbf.asset import Asset
+from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.capture import Capture
 from srbf.errors import BakeError
@@ -56,7 +56,9 @@ def nearest_texel(position: np.ndarray, x: float, y: float) -> tuple[int, int]:
 @pytest.fixture(scope="module")
 def occluder(blend, tmp_path_factory: pytest.TempPathFactory) -> Capture:
     settings = BakeSettings(Receiver.parse("lightmap:Plane"), 32, 32, lights=300, samples=2, validation=0, holdout=0, quantity="irradiance")
-    return Baked(blend("occluder"), tmp_path_factory.mktemp("occluder") / "capture", settings).capture
+    folder = tmp_path_factory.mktemp("occluder") / "capture"
+    Bake(blend("occluder"), folder, settings).run(Reporter())
+    return Capture.open(folder)
 
 
 @pytest.fixture(scope="module")
