@@ -7,7 +7,7 @@ import os
 import pkgutil
 import signal
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
 # Before numpy loads: one thread per test process for BLAS, OpenMP and Mesa's software renderer, or the processes of -n wait for each other.
@@ -39,6 +39,7 @@ from made_captures import write_capture  # noqa: E402
 
 from srbf.asset import Asset  # noqa: E402
 from srbf.capture import Capture  # noqa: E402
+from srbf.encode import position_table  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
 
@@ -89,6 +90,14 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.section(f"more than {LONG:g} s of processor time, and not marked slow")
         for spent, test in long:
             terminalreporter.write_line(f"{spent:6.1f} s  {test}")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def coarse_tables_of_places() -> Iterator[None]:
+    """Of few nodes: each asks a method for the weights of a light, and thousands take seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(position_table, "MOST_NODES", 128)
+        yield
 
 
 @pytest.fixture(scope="session")

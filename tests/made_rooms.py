@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -108,20 +109,22 @@ class Room:
             factor /= np.maximum(factor.sum(axis=1, keepdims=True), 1e-12)
         return factor
 
+    @cache  # noqa: B019  (rooms are few)
     def transport(self) -> np.ndarray:
         """(N, N, 3): indirect irradiance at each cell per unit of irradiance on another, all bounces."""
         count, factor = len(self.places), self.factors()
-        result = np.empty((count, count, 3), np.float32)
+        result = np.empty((3, count, count), np.float32)
         for c in range(3):
             rho = self.albedo[:, c]
             radiosity = np.linalg.solve(np.eye(count) - rho[:, None] * factor, np.diag(rho))
-            result[:, :, c] = factor @ radiosity
-        return result
+            result[c] = factor @ radiosity
+        return np.moveaxis(result, 0, 2)
 
     def direct(self, place: np.ndarray) -> np.ndarray:
         """(N,) irradiance of a point light of unit irradiance at 1 m."""
         amount = np.zeros(len(self.places))
-        axes = np.array([np.eye(3)[np.abs(normal) < 0.5] for normal in self.normals])  # (N, 2, 3): walls are along the axes
+        across = np.abs(self.normals).argmax(axis=1)  # walls are along the axes
+        axes = np.eye(3)[np.stack([(across + 1) % 3, (across + 2) % 3], axis=1)]  # (N, 2, 3)
         steps = (np.arange(4) + 0.5) / 4 - 0.5
         for s, t in itertools.product(steps, steps):
             toward = place - self.places - np.sqrt(self.areas)[:, None] * (s * axes[:, 0] + t * axes[:, 1])
@@ -132,6 +135,12 @@ class Room:
         amount[front] *= self.sees(self.places[front] + 1e-4 * self.normals[front], np.broadcast_to(place, (len(front), 3)))
         return amount
 
+    def indirect(self, places: np.ndarray) -> np.ndarray:
+        """(b, N, 3) indirect irradiance of point lights of unit irradiance at 1 m."""
+        direct = np.array([self.direct(place) for place in places], np.float32)
+        return np.stack([direct @ transport.T for transport in np.moveaxis(self.transport(), 2, 0)], axis=2)
+
+    @cache  # noqa: B019  (rooms are few)
     def patches(self, count: int) -> np.ndarray:
         """The patch of each cell, as a bake chooses them."""
         cells = Cells(
@@ -204,32 +213,29 @@ def room_of_patches(folder: Path, room: Room, count: int, noise: float = 0.0, te
         lights.append({"kind": "patch", "patch": k, "role": "train"})
         images.append(values * (1 + noise * rng.standard_normal(values.shape)))
     for role, places in (("validation", room.free[:4]), ("holdout", room.free[-tested:])):
-        for place in places:
-            lights.append({"kind": "point", "position": place.tolist(), "role": role})
-            images.append(np.einsum("ijc,j->ic", transport, room.direct(place)))
+        lights += [{"kind": "point", "position": place.tolist(), "role": role} for place in places]
+        images += [*room.indirect(places)]
     return write_room(folder, room, lights, images, labels)
 
 
 def room_of_points(folder: Path, room: Room, count: int, tested: int = 12) -> Capture:
     """Point lights captured at random free places, others held out."""
-    transport, labels = room.transport(), room.patches(64)
-    lights, images = [], []
+    labels = room.patches(64)
+    lights: list[dict[str, Any]] = []
+    images: list[np.ndarray] = []
     for role, places in (("train", room.free[:count]), ("validation", room.free[count : count + 4]), ("holdout", room.free[-tested:])):
-        for place in places:
-            lights.append({"kind": "point", "position": place.tolist(), "role": role})
-            images.append(np.einsum("ijc,j->ic", transport, room.direct(place)))
+        lights += [{"kind": "point", "position": place.tolist(), "role": role} for place in places]
+        images += [*room.indirect(places)]
     return write_room(folder, room, lights, images, labels)
 
 
 def room_of_surfels(folder: Path, room: Room, count: int, tested: int = 12) -> Capture:
     """A transfer operator traced in a room, about `count` surfels of it, and point lights held out."""
-    transport = room.transport()
     lights: list[dict[str, Any]] = []
-    images = []
+    images: list[np.ndarray] = []
     for role, places in (("validation", room.free[:4]), ("holdout", room.free[-tested:])):
-        for place in places:
-            lights.append({"kind": "point", "position": place.tolist(), "role": role})
-            images.append(np.einsum("ijc,j->ic", transport, room.direct(place)))
+        lights += [{"kind": "point", "position": place.tolist(), "role": role} for place in places]
+        images += [*room.indirect(places)]
     corners = divided(room.corners, 0.7 * float(np.sqrt(room.areas.sum() / count)))
     red = corners[:, :, 0].max(axis=1) < 1e-6
     albedo = np.where(red[:, None], room.albedo[room.places[:, 0] < 1e-6][0], room.albedo[room.places[:, 0] > 1e-6][0])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from building import ROOT, SCENES, built
+from building import FEW, ROOT, SCENES, built
 from surfaces import check_normals
 
 from srbf.bake.run import Bake, Reporter
@@ -21,13 +21,21 @@ sys.path.insert(0, str(ROOT / "benchmarks"))  # faults, for tests that put them 
 @pytest.fixture(scope="session")
 def blend(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """The .blend of a named scene of closed_form_scenes.py."""
-    return built("closed_form_scenes.py", tmp_path_factory.mktemp("scenes"))
+    return built("closed_form_scenes.py", tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """The .blend of a named scene of real_scenes.py."""
-    return built("real_scenes.py", tmp_path_factory.mktemp("real"))
+    return built("real_scenes.py", tmp_path_factory)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def few_places_and_cells() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for name, few in FEW.items():
+            patch.setattr(f"srbf.{name}", few)
+        yield
 
 
 LEANING = {"normal mapped"}  # scenes whose materials turn normals away from the surface, as their tests check

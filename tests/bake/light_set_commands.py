@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+from building import FEW, built
 from typer.testing import CliRunner, Result
 
 from srbf.cli import app
@@ -25,6 +26,12 @@ def done(*words: object) -> Result:
     return result
 
 
+def of_a_process(*words: object) -> list[str]:
+    """The same command line for a process that can be killed."""
+    lines = [f"import srbf.{name.rpartition('.')[0]}; srbf.{name} = {few}" for name, few in FEW.items()]
+    return [sys.executable, "-c", "; ".join([*lines, "from srbf.cli import app", "app()"]), *map(str, words)]
+
+
 def refused(words: list[object], status: int = 1) -> str:
     """The one line of a command that fails."""
     result = srbf(*words)
@@ -33,14 +40,6 @@ def refused(words: list[object], status: int = 1) -> str:
     return line
 
 
-def scenes_in(folder: Path) -> Callable[[str], Path]:
-    """The .blend of a scene of light_set_scenes.py, built when first asked for."""
-
-    def build(name: str) -> Path:
-        path = folder / f"{name}.blend"
-        if not path.exists():
-            script = Path(__file__).with_name("light_set_scenes.py")
-            subprocess.run([sys.executable, str(script), name, str(path)], check=True, capture_output=True, timeout=120)
-        return path
-
-    return build
+def scenes_in(factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The .blend of a scene of light_set_scenes.py."""
+    return built("../../tests/bake/light_set_scenes.py", factory)

@@ -47,7 +47,7 @@ KEPT = ["simplified", "linked_lights", "indirect_only", "holdout_occluder", "sha
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return built("bake_fidelity.py", tmp_path_factory.mktemp("left"))
+    return built("bake_fidelity.py", tmp_path_factory)
 
 
 def bake(scene: Path, folder: Path, receiver: str = "lightmap:Ground", **settings: object) -> Baked:

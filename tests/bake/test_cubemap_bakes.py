@@ -39,7 +39,7 @@ def few_places() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))
+    return scenes_in(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")

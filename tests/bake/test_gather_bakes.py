@@ -32,7 +32,7 @@ CLOTH, WHOLE = 0.08, 0.05  # of the light of some 20 pixels, and of the picture:
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))
+    return scenes_in(tmp_path_factory)
 
 
 def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None:

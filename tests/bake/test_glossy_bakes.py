@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from bpy_process import in_blender
-from building import built
 from faults import contents
+from light_set_commands import scenes_in
 from made_places import places_of
 from typer.testing import CliRunner
 
@@ -187,7 +187,7 @@ def srbf(*words: object) -> str:
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return built("../../tests/bake/light_set_scenes.py", tmp_path_factory.mktemp("scenes"))("room")
+    return scenes_in(tmp_path_factory)("room")
 
 
 @pytest.mark.slow

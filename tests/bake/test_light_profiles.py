@@ -45,7 +45,7 @@ LANTERN = {
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))("luminaires")
+    return scenes_in(tmp_path_factory)("luminaires")
 
 
 @pytest.fixture(scope="module")

@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faults import contents, workers_of
-from light_set_commands import NAMES, done, refused, scenes_in
+from light_set_commands import NAMES, done, of_a_process, refused, scenes_in
 from test_resume import wait_for_lights
 
+from srbf.bake import light_sets
 from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE
 from srbf.capture import Capture
 from srbf.io.image import read_image
@@ -36,7 +37,7 @@ OFF = 0.1  # m that held-out lights keep off surfaces
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))
+    return scenes_in(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +81,7 @@ def test_a_capture_holds_the_lights_of_its_set(whole, kind: str) -> None:
     assert [light["patch"] for light in train] == list(range(8)) if kind == "patches" else all("position" in light for light in train)
     free, low, high = np.array(capture.manifest["free_places"]), np.zeros(3), np.array([3, 2, 2])
     held = np.array([light["position"] for light in tested])
-    assert free.shape == (1024, 3)
+    assert free.shape == (light_sets.PLACES, 3)
     for places, off in ((free, 0.06), (held, OFF)):
         assert (places > low + off - 1e-6).all() and (places < high - off + 1e-6).all()
         assert not ((places > [2, 1.2, 0]) & (places < [2.5, 1.7, 0.6])).all(axis=1).any()  # in the crate
@@ -119,7 +120,7 @@ def test_other_receivers_hold_them_too(scene, whole, tmp_path: Path, receiver: s
 def test_a_killed_bake_goes_on_to_the_same_bits(scene, whole, tmp_path: Path, kind: str) -> None:
     folder = seeded(tmp_path / "capture", whole(kind))
     command = ["bake", scene("room"), "-o", folder, *ATLAS, *COUNTS, *SETS[kind]]
-    process = subprocess.Popen([sys.executable, "-m", "srbf", *map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen(of_a_process(*command), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     wait_for_lights(folder, 4, process)
     os.kill(process.pid, signal.SIGKILL)
     process.communicate(timeout=60)

@@ -28,7 +28,7 @@ SCREEN = NAMES[3]
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))
+    return scenes_in(tmp_path_factory)
 
 
 @pytest.mark.parametrize(

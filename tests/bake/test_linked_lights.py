@@ -29,7 +29,7 @@ POINT = {"kind": "point", "position": [1.3, 1.0, 1.5], "falloff": "inverse-squar
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))("linked")
+    return scenes_in(tmp_path_factory)("linked")
 
 
 @pytest.fixture(scope="module")

@@ -78,9 +78,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def surroundings(folder: Path) -> Scene:
+def surroundings(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Scene:
     """With the capture of its ground, by the command; its materials have node groups, which a bake must keep."""
-    build = built("surroundings.py", folder)
+    build = built("surroundings.py", tmp_path_factory)
     baked(build("surroundings"), folder / "capture", Receiver("lightmap", "Ground", "lightmap"))
     line = ["mesh", build("surroundings"), "-o", folder / "scene.glb", "--capture", folder / "capture", "--json"]
     done = CliRunner().invoke(app, list(map(str, line)))

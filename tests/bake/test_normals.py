@@ -44,7 +44,7 @@ MATRICES = {
 
 @pytest.fixture(scope="session")
 def uneven(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return built("uneven.py", tmp_path_factory.mktemp("uneven"))
+    return built("uneven.py", tmp_path_factory)
 
 
 def baked(scene: Path, folder: Path, receiver: str, **settings: object) -> Baked:

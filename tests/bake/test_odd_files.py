@@ -28,7 +28,7 @@ OF_OTHERS = ["EDIT_CURVE", "POSE", "SCULPT_CURVES", "PAINT_GREASE_PENCIL"]
 
 @pytest.fixture(scope="session")
 def odd(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return built("odd_files.py", tmp_path_factory.mktemp("odd"))
+    return built("odd_files.py", tmp_path_factory)
 
 
 def bake(scene: Path, folder: Path, receiver: str, width: int = 16, height: int = 16, **settings: object) -> Baked:

@@ -25,7 +25,7 @@ UNTESTED = ["--validation", "0", "--holdout", "0"]
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))
+    return scenes_in(tmp_path_factory)
 
 
 def test_a_uniform_environment_gives_pi(scene, tmp_path: Path) -> None:

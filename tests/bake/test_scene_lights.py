@@ -37,7 +37,7 @@ DISK = np.sqrt(np.pi) / 2
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))
+    return scenes_in(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")

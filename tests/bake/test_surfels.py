@@ -27,7 +27,7 @@ TESTED = ["--validation", "0", "--holdout", "3", "--holdout-samples", "256"]
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return scenes_in(tmp_path_factory.mktemp("scenes"))
+    return scenes_in(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")

@@ -31,6 +31,7 @@ class NobodyRunsIt(AssertionError):
         super().__init__(f"{command}\n  {why}")
 
 
+@cache
 def steps(command: Command) -> list[Command]:
     """What a shell does for it one after the other; a target of make is as good as its recipe."""
     found = []
@@ -65,6 +66,7 @@ def _plain(command: Command) -> list[str]:
     return [word.partition("=")[0] if word.startswith("--") else word for word in command.words]
 
 
+@cache
 def class_of(command: Command, script: bool) -> Class:
     """The class of one step; in a script each is a whole command, elsewhere it may be a mention of one. NobodyRunsIt where it has none."""
     program, *rest = command.words

@@ -54,7 +54,7 @@ if sys.argv[2] != "Table":
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
 """
 FRAMES = {"frames": [{"lights": [{"kind": "directional", "direction": [0, 0.5, 1], "color": [1, 1, 1]}]}, {"lights": []}]}
-FEW = {"bake.cubemap_set.SURFELS": 200, "bake.light_sets.SURFEL_PLACES": 400}
+FEW = {"bake.cubemap_set.SURFELS": 200, "bake.light_sets.SURFEL_PLACES": 400, "visibility.patches.FEWEST_CELLS": 400}
 FEW |= {f"visibility.transfer_operator.{name}_RAYS": 64 for name in ("FEWEST", "MOST", "SURFEL")}
 FEW |= {f"visibility.transfer_basis.{name}": 40 for name in ("PLACED", "MOST_PLACED", "NEAR", "SPOTS")}
 OUTPUTS = ("-o", "--output", "--save")

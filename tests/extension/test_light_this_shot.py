@@ -72,9 +72,9 @@ def test_a_bake_that_fails_opens_no_page(in_blender, tmp_path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("built")
-def test_a_true_shot_is_served(in_blender, tmp_path) -> None:
+def test_a_true_shot_is_served(in_blender, tmp_path, tmp_path_factory) -> None:
     pytest.importorskip("embreex")
-    scene = scenes_in(tmp_path)("room")
+    scene = scenes_in(tmp_path_factory)("room")
     host = tmp_path / "host.py"
     more = "import sys\nsys.argv += {'view': ['--no-browser'], 'bake': ['--pool', '600']}.get(sys.argv[1], [])\n"
     host.write_text(more + (ROOT / "blender_extension" / "host.py").read_text())

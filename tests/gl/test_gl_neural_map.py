@@ -21,15 +21,18 @@ SUN = DirectionalLight((0.3, 0.2, 0.9), (1, 0.5, 0.2))
 POINT = PointLight((0.2, 0.1, 0.7), (0.4, 1, 0.3), a0=0.8)
 SPOT = SpotLight((0, -0.5, 1), (1, 1, 0.5), direction=(0, 0.5, -1), inner=0.2, outer=0.7)
 ENVIRONMENT = EnvironmentLight(np.random.default_rng(0).random((8, 16, 3)).astype(np.float32))
+EVERY: list[Light] = [SUN, POINT, ENVIRONMENT, SPOT]
 MANY: list[Light] = [DirectionalLight(tuple(d), tuple(abs(d))) for d in random_directions(37, "hemisphere", np.random.default_rng(4))]
 POINTS: list[Light] = [PointLight(tuple(d), tuple(abs(d))) for d in random_directions(11, "hemisphere", np.random.default_rng(5))]
 
 
-@pytest.mark.parametrize("encoding", ["uint8", "half", "float"])
 @pytest.mark.parametrize(
-    "lights",
-    [[SUN], [POINT], [SPOT], [ENVIRONMENT], [SUN, POINT, ENVIRONMENT, SPOT], MANY, POINTS],
-    ids=lambda lights: f"{len(lights)}{lights[0].__class__.__name__}",
+    ("encoding", "lights"),
+    [
+        *[("float", lights) for lights in ([SUN], [POINT], [SPOT], [ENVIRONMENT], EVERY, MANY, POINTS)],
+        *[(encoding, EVERY) for encoding in ("uint8", "half")],
+    ],
+    ids=lambda value: value if isinstance(value, str) else f"{len(value)}{value[0].__class__.__name__}",
 )
 def test_equals_numpy(context: Any, encoding: Encoding, lights: list[Light]) -> None:
     asset = build_neural(9, 8, encoding)

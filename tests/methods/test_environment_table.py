@@ -44,7 +44,6 @@ def asset(capture: Capture) -> Asset:
     with pytest.MonkeyPatch.context() as patch:
         for name in ("PLACED", "MOST_PLACED", "NEAR", "SPOTS"):
             patch.setattr(f"srbf.visibility.transfer_basis.{name}", 40)
-        patch.setattr("srbf.encode.position_table.MOST_NODES", 64)
         return SETTINGS.encode(capture)
 
 

@@ -93,12 +93,13 @@ def test_names_that_clash_are_refused(tmp_path: Path) -> None:
         LightMix().encode(twice)
 
 
-def test_thousands_of_names(tmp_path: Path) -> None:
-    names = tuple(f"Bulb {i:04d}" for i in range(1500))
-    images = np.broadcast_to(np.linspace(0, 1, 1500)[:, None, None, None], (1500, 4, 4, 3)).astype(np.float32)
+def test_more_than_a_thousand_names(tmp_path: Path) -> None:
+    count = 1030
+    names = tuple(f"Bulb {i:04d}" for i in range(count))
+    images = np.broadcast_to(np.linspace(0, 1, count)[:, None, None, None], (count, 2, 2, 3)).astype(np.float32)
     asset = LightMix(1, 4).encode(capture_of_names(tmp_path / "capture", images, names, holes=False))
     lit = relight(asset, [NamedLight(name) for name in names])
-    assert lit.mean() == pytest.approx(750, rel=HALF)
+    assert lit.mean() == pytest.approx(count / 2, rel=HALF)
 
 
 def test_one_light_is_enough(tmp_path: Path) -> None:

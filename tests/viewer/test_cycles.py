@@ -42,7 +42,7 @@ ERROR = 0.15  # of 64 samples, most of it noise
 def shot(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """The asset's folder and the .blend."""
     folder = tmp_path_factory.mktemp("shot")
-    scene = scenes_in(folder)("designed")
+    scene = scenes_in(tmp_path_factory)("designed")
     size = "x".join(map(str, SIZE))
     done(
         "bake",

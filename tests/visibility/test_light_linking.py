@@ -15,6 +15,7 @@ from srbf.arrays import Float32
 from srbf.errors import InputError
 from srbf.light_linking import Objects
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
+from srbf.visibility import shadow_map
 from srbf.visibility.rays import RayTracer
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.shadow_map import ShadowMapper
@@ -52,6 +53,13 @@ def shown_by(way: str, receivers: Receivers) -> Iterator[Any]:
     pytest.importorskip("moderngl")
     with ShadowMapper(receivers) as mapper:
         yield mapper
+
+
+@pytest.fixture(autouse=True)
+def few_maps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a light with a size: which object casts or is lit is the same in each."""
+    monkeypatch.setattr(shadow_map, "LOOKS", 8)
+    monkeypatch.setattr(shadow_map, "SUN_SAMPLES", 4)
 
 
 def on_roof(receivers: Receivers) -> np.ndarray:
