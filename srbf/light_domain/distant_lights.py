@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy import ndarray
 from srbf.arrays import Float64
 from srbf.light_domain.registry import domain_of_asset
 from srbf.lights import DirectionalLight, Light, refuse_named
-from srbf.sphere import point_set
+from srbf.sphere import Domain, point_set
 
 NODES = 256  # directions that an environment is seen from
 
@@ -32,7 +33,12 @@ def distant_lights(manifest: dict[str, Any], lights: Sequence[Light]) -> tuple[F
 
 def nodes_of(manifest: dict[str, Any]) -> Float64[ndarray, "NODES 3"]:
     """Directions over an asset's domain, each for an equal part of it."""
-    return point_set("fibonacci", NODES, manifest["domain"])
+    return _nodes(manifest["domain"])
+
+
+@cache
+def _nodes(domain: Domain) -> Float64[ndarray, "NODES 3"]:
+    return point_set("fibonacci", NODES, domain)
 
 
 def node_light(manifest: dict[str, Any], lights: Sequence[Light]) -> Float64[ndarray, "NODES 3"]:

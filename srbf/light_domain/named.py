@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -87,9 +88,14 @@ class Named(LightDomain):
             raise InputError(
                 f"expected lights by name for an asset of named lights, found a {kind} light; its lights are {_listed(self.names)}"
             )
-        if light.name not in self.names:
+        number = self._numbers.get(light.name)
+        if number is None:
             raise InputError(f"expected a light of the asset, found {light.name!r}; its lights are {_listed(self.names)}")
-        return self.names.index(light.name)
+        return number
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.names)}
 
 
 def _listed(names: Sequence[str]) -> str:
