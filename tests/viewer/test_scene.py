@@ -16,6 +16,7 @@ from web_assets import complete, on_a_plane
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.export.gltf import model
+from srbf.io.glb import Glb
 from srbf.io.image import read_image
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
@@ -102,6 +103,37 @@ def test_a_lightmap_is_shown_on_its_mesh(chromium: Any, lightmap: Asset, serve: 
     turned = np.array(chromium.state()["eye"][0])
     assert np.linalg.norm(turned - eye) > 0.2
     assert np.linalg.norm(turned - target) == pytest.approx(np.linalg.norm(eye - target), rel=1e-3)
+
+
+def test_a_camera_among_the_receivers_stays_where_a_window_is_narrow(
+    chromium: Any, lightmap: Asset, serve: Callable[..., str], tmp_path: Path
+) -> None:
+    """A wider angle shows as much of the scene's width as a usual window does: a camera in a room does not go back through its wall."""
+    position = lightmap.images["position"].reshape(-1, 3)
+    target = (position.min(axis=0) + position.max(axis=0)) / 2
+    eye = target + np.array([0.1, -0.8, 0.2])
+    document = Glb.parse(model(lightmap))
+    camera = document.add("cameras", {"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}})
+    node = document.add("nodes", {"camera": camera, "translation": [float(eye[0]), float(eye[2]), float(-eye[1])]})
+    document.json["scenes"][0]["nodes"].append(node)
+    (tmp_path / "scene.glb").write_bytes(document.pack())
+    lightmap.save(tmp_path / "asset")
+    chromium("open", url=serve(tmp_path / "asset", mesh=tmp_path / "scene.glb") + "#{'selected':-1,'exposure':-1.5}", width=390, height=844)
+    shown = chromium.canvas().astype(float)
+    height, width, _ = shown.shape
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0, 0, 1]) / np.linalg.norm(np.cross(forward, [0, 0, 1]))
+    axes = np.stack([right, np.cross(right, forward), forward])
+    expected = shown_as(relight(lightmap, [DirectionalLight((-0.45, -0.5, 0.74))]), -1.5)
+    equal = []
+    for row, column in np.ndindex(lightmap.height, lightmap.width):
+        x, y, away = axes @ (lightmap.images["position"][row, column] - eye)
+        at = np.array([width, height]) / 2 + np.array([x, -y]) / away * width / 2 / 1.15 / np.tan(TURN)
+        if away <= 0 or not (0 <= at[0] < width and 0.25 * height < at[1] < 0.75 * height):
+            continue  # beside the page's own text
+        equal.append(np.abs(shown[int(at[1]), int(at[0])] - expected[row, column]).max() <= 3)
+    assert len(equal) > 100
+    assert np.mean(equal) > 0.9
 
 
 def test_a_mesh_of_one_s_own_is_shown(chromium: Any, lightmap: Asset, serve: Callable[..., str], tmp_path: Path) -> None:

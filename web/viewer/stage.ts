@@ -31,13 +31,15 @@ import { Surroundings } from "./surroundings";
 
 const BACKGROUND_BYTES = BACKGROUND.clone().convertLinearToSRGB(); // three encodes the clear color of a canvas, but not that of a target
 const MOST_PIXEL_RATIO = 2;
+const FIELD_OF_VIEW = 38; // degrees
+const WIDE = 1.15; // width over height, from which on a window shows all of a scene's width
 
 export class Stage {
   readonly gizmos: PointLightGizmos;
   private readonly scene = new Scene();
   private readonly picture = new Scene();
   private readonly orbit: OrbitControls;
-  private readonly orbitCamera = new PerspectiveCamera(38, 1, 0.01, 100);
+  private readonly orbitCamera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
   private camera: PerspectiveCamera | undefined;
   private readonly quad: Mesh;
   private readonly developed = new Scene();
@@ -180,6 +182,7 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, MOST_PIXEL_RATIO));
     this.renderer.setSize(Math.max(1, width), Math.max(1, height));
     this.orbitCamera.aspect = width / Math.max(1, height);
+    this.orbitCamera.fov = this.fieldOfView();
     this.placeCamera();
   }
 
@@ -307,18 +310,40 @@ export class Stage {
     this.orbitCamera.updateMatrixWorld(true);
   }
 
-  /** From the position of the file's own camera, or from above and in front; it looks at the receivers' center. */
+  /**
+   * From the position of the file's own camera, or from above and in front; it looks at the receivers' center. A narrow window is farther away; a camera among
+   * the receivers, as in a room, stays there and sees as much by a wider angle.
+   */
   private firstView(): [Triple, Triple] {
     const { center, radius } = this.receivers.bounds;
-    const farther = Math.max(1, 1.15 / this.orbitCamera.aspect); // where the window is narrow
-    const own = (this.model?.userData.cameras as Object3D[] | undefined)?.[0];
-    if (own) {
-      own.updateWorldMatrix(true, false);
-      const eye = fromThree(new Vector3().setFromMatrixPosition(own.matrixWorld));
-      return [eye.map((x, i) => center[i] + (x - center[i]) * farther) as unknown as Triple, center];
-    }
-    const away = radius * farther;
+    const own = this.ownEye();
+    if (own) return [this.isAmong(own) ? own : (own.map((x, i) => center[i] + (x - center[i]) * this.narrowness) as unknown as Triple), center];
+    const away = radius * this.narrowness;
     return [[center[0] - 0.9 * away, center[1] - 2.1 * away, center[2] + 1.9 * away], center];
+  }
+
+  /** How much less of a scene's width the window shows than a usual one, 1 or more. */
+  private get narrowness(): number {
+    return Math.max(1, WIDE / this.orbitCamera.aspect);
+  }
+
+  /** Degrees, of the window's height. */
+  private fieldOfView(): number {
+    const own = this.ownEye();
+    if (!own || !this.isAmong(own)) return FIELD_OF_VIEW;
+    return (360 / Math.PI) * Math.atan(Math.tan((FIELD_OF_VIEW * Math.PI) / 360) * this.narrowness);
+  }
+
+  /** The position of the file's own camera. */
+  private ownEye(): Triple | undefined {
+    const own = (this.model?.userData.cameras as Object3D[] | undefined)?.[0];
+    own?.updateWorldMatrix(true, false);
+    return own && fromThree(new Vector3().setFromMatrixPosition(own.matrixWorld));
+  }
+
+  private isAmong(eye: Triple): boolean {
+    const { center, radius } = this.receivers.bounds;
+    return Math.hypot(...eye.map((x, i) => x - center[i])) < radius;
   }
 
   /** Meshes with the extension take the relit light; the rest of the file is ignored. */
