@@ -26,6 +26,11 @@ export function engineShadow(light: SceneLight, renderer: Shadowing, sceneFromAs
   return { light, sceneFromAsset: sceneFromAsset() };
 }
 
+/** Equal of the looks of lights that differ in color alone; undefined where an engine's shadow may have changed. */
+export function keyOf(looks: readonly ShadowedLook[]): string | undefined {
+  return looks.some(({ shadow }) => shadow) ? undefined : JSON.stringify(looks.map((look) => ({ ...look, color: 1 })));
+}
+
 /** Defines and uniforms of surfel_irradiance.glsl. */
 export function shadowUniforms(renderer: WebGLRenderer, { light, sceneFromAsset }: EngineShadow, middle: Triple): { defines: Record<string, number>; values: Record<string, unknown> } {
   const { shadow } = light;

@@ -13,10 +13,11 @@ import { ACROSS, type Gather, type PackedLinks, weightRows } from "../gather";
 import type { ShapeLights } from "../shape_weights";
 import type { Triple } from "../matrix";
 import { packedCells } from "../surfels";
-import type { ShadowedLook } from "./engine_shadows";
-import { floatTarget, floatTexture } from "./float_textures";
+import { keyOf, type ShadowedLook } from "./engine_shadows";
+import { floatTarget } from "./float_textures";
 import { FullscreenPass, within } from "./fullscreen";
 import { NearIrradiance } from "./near_irradiance";
+import { colorTexture } from "./pool_textures";
 import { SurfelIrradiance } from "./surfel_irradiance";
 import { tableTexture } from "./textures";
 
@@ -52,13 +53,8 @@ export class GatherWeights {
     this.middle = cells.middle;
     this.direct = new SurfelIrradiance(gather.surfels, cells, shadowSize, { SRBF_MEAN_NORMALS: 1 });
     if (gather.near) this.near = new NearIrradiance(gather, gather.near, cells, this.direct);
-    const colors = (values: Float32Array) => {
-      const texels = new Float32Array(4 * cells.width * cells.height);
-      for (let i = 0; i < gather.surfels.cells.count; ++i) texels.set(values.subarray(3 * i, 3 * i + 3), 4 * i);
-      return floatTexture(texels, cells.width, cells.height);
-    };
-    this.albedo = colors(gather.albedo);
-    if (gather.specular) this.specular = { albedo: colors(gather.specular), target: floatTarget(cells.width, cells.height) };
+    this.albedo = colorTexture(gather.albedo, cells);
+    if (gather.specular) this.specular = { albedo: colorTexture(gather.specular, cells), target: floatTarget(cells.width, cells.height) };
     this.radiosity = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
     this.rows = weightRows(gather);
     this.size = [ACROSS, this.rows[0] + this.rows[1]];
@@ -164,11 +160,6 @@ export class GatherWeights {
     const [before, own] = this.rows;
     within(target, before, own, (part) => lobes.draw(renderer, part));
   }
-}
-
-/** Equal of lights that differ in color alone; undefined where an engine's shadow may have changed. */
-export function keyOf(looks: readonly ShadowedLook[]): string | undefined {
-  return looks.some(({ shadow }) => shadow) ? undefined : JSON.stringify(looks.map((look) => ({ ...look, color: 1 })));
 }
 
 /** `before`: rows of the target before theirs. */

@@ -12,6 +12,7 @@ import nearSeen from "../shaders/near_seen.glsl";
 import type { Look, PackedCells } from "../surfels";
 import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass, within } from "./fullscreen";
+import { clusterTextures } from "./pool_textures";
 import type { SurfelIrradiance } from "./surfel_irradiance";
 
 const NEAREST = 5e-4; // meters: a cell is seen from close above its surface, which hides what is behind
@@ -59,12 +60,7 @@ export class NearIrradiance {
     this.far = floatTexture(new Float32Array(4 * width * height), width, height);
     if (gather.gloss) this.taken = floatTexture(new Float32Array(4 * width * height), width, height);
     this.sources = floatTexture(new Float32Array(12 * ENTRIES), ENTRIES, 3);
-    const rows = Math.ceil(pool.clusters / ACROSS);
-    this.textures = [pool.places, pool.normals].map((values, row) => {
-      const texels = new Float32Array(4 * ACROSS * rows);
-      for (let i = 0; i < 3 * pool.clusters; ++i) texels[4 * Math.floor(i / 3) + (i % 3)] = values[i] - (row === 0 ? cells.middle[i % 3] : 0);
-      return floatTexture(texels, ACROSS, rows);
-    });
+    this.textures = clusterTextures(pool, cells.middle);
   }
 
   /** Of a light's irradiance on the surfels; undefined where none is bright. Within `undisturbed`. */

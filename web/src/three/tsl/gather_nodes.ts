@@ -14,9 +14,8 @@ import { Occluders } from "../../occluders";
 import { FAR } from "../../received_light";
 import type { ShapeLights } from "../../shape_weights";
 import { type PackedCells, packedCells, type Placed } from "../../surfels";
-import type { ShadowedLook } from "../engine_shadows";
-import { floatTexture } from "../float_textures";
-import { keyOf } from "../gather_weights";
+import { keyOf, type ShadowedLook } from "../engine_shadows";
+import { colorTexture } from "../pool_textures";
 import { IrradianceNodes } from "./irradiance_nodes";
 import { compute, floatStorage, summingKernel } from "./kernels";
 import { LinkNodes } from "./linked_nodes";
@@ -66,13 +65,8 @@ export class GatherNodes {
     this.middle = cells.middle;
     this.direct = new IrradianceNodes(gather.surfels, cells, shadowSize, true);
     this.irradiance = texture(this.direct.sums[0].texture);
-    const colors = (values: Float32Array) => {
-      const texels = new Float32Array(4 * cells.width * cells.height);
-      for (let i = 0; i < gather.surfels.cells.count; ++i) texels.set(values.subarray(3 * i, 3 * i + 3), 4 * i);
-      return floatTexture(texels, cells.width, cells.height);
-    };
-    const albedo = colors(gather.albedo);
-    const specular = gather.specular && colors(gather.specular);
+    const albedo = colorTexture(gather.albedo, cells);
+    const specular = gather.specular && colorTexture(gather.specular, cells);
     this.textures = [albedo, ...(specular ? [specular] : [])];
     if (gather.near) this.near = new NearNodes(gather.near, cells, this.direct, { albedo, irradiance: this.irradiance });
     const { exchange, view, gloss } = gather;

@@ -8,6 +8,7 @@ import { ENTRIES, type NearPool, type NearSources, type SendingCell } from "../.
 import type { Triple } from "../../matrix";
 import type { PackedCells } from "../../surfels";
 import { floatTexture } from "../float_textures";
+import { clusterTextures } from "../pool_textures";
 import { each } from "./inputs";
 import type { IrradianceNodes } from "./irradiance_nodes";
 import type { N } from "./nodes";
@@ -60,11 +61,7 @@ export class NearNodes {
     this.parts = floatTexture(new Float32Array(4 * width * height), width, height);
     this.sources = floatTexture(new Float32Array(4 * ENTRIES), ENTRIES, 1);
     const rows = Math.ceil(pool.clusters / ACROSS);
-    this.textures = [pool.places, pool.normals].map((values, row) => {
-      const texels = new Float32Array(4 * ACROSS * rows);
-      for (let i = 0; i < 3 * pool.clusters; ++i) texels[4 * Math.floor(i / 3) + (i % 3)] = values[i] - (row === 0 ? cells.middle[i % 3] : 0);
-      return floatTexture(texels, ACROSS, rows);
-    });
+    this.textures = clusterTextures(pool, cells.middle);
     this.slots = new NearSlots(Math.min(SLOTS, Math.floor(LARGEST / Math.max(height, rows))));
     this.onSurfels = this.receivers(direct.places, direct.normals, width, height);
     this.onClusters = this.receivers(this.textures[0], this.textures[1], ACROSS, rows);
