@@ -53,7 +53,7 @@ def page_of(scene: str, demo: Path, folder: Path) -> LivePage:
     """Save the page of a demo; CalledProcessError where srbf says why it cannot."""
     path, mesh, asset = folder / f"{scene}.html", demo / "scene.glb", demo / "asset"
     if scene in SMALLER:
-        asset = demo / "live"
+        asset = folder.parent / scene / "asset"
         if not (asset / "asset.json").is_file():
             srbf("fit", str(demo / "capture"), "-o", str(asset), *SMALLER[scene])
     srbf("view", str(asset), *(["--mesh", str(mesh)] if mesh.is_file() else []), "--save", str(path), "--force")
