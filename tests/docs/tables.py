@@ -65,6 +65,7 @@ ELSEWHERE = {
     "openjd run *": f"{FARM}::test_an_openjd_job_bakes_the_same_bits_and_fits",
     "python -m blender_bake *": "tests/bake/test_end_to_end.py::test_scene_to_image",  # as every bake does
     "python -m scripts.gallery *": "tests/test_gallery.py::test_it_goes_on_after_a_kill",
+    "python -m scripts.live_pages *": "tests/viewer/test_live_pages.py::test_demos_become_pages_and_a_list",
     "python benchmarks/torture.py *": "tests/bake/test_torture.py::test_nothing_is_lost",
     "python scripts/build_extension.py *": "tests/extension/test_zip.py::test_the_zip_builds_and_validates",
     "blender --python lights.py *": "tests/viewer/test_shot.py::test_the_script_makes_the_lights_in_blender",
@@ -75,6 +76,7 @@ ELSEWHERE = {
     "srbf relight --scene-lights *": "tests/bake/test_scene_lights.py::test_relighting_by_them_is_what_cycles_renders",
     "srbf relight --scene-lights --reference *": "tests/bake/test_scene_lights.py::test_a_relit_picture_is_compared_with_cycles",
     "srbf view --profile *": "tests/viewer/test_gloss.py::test_the_command_takes_profiles",
+    "srbf view --environment *": "tests/viewer/test_page.py::test_given_environments_shine_from_the_start",
     "srbf view --probes *": "tests/viewer/test_ball.py::test_the_command_takes_probes_with_it",
     "npm ci *": "tests/npm_package.py::npm",
     "npm test *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
