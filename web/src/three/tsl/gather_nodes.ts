@@ -5,7 +5,7 @@
 import type { DataTexture, RenderTarget, Texture } from "three";
 import { Vector3 } from "three";
 import * as tsl from "three/tsl";
-import type { Renderer, StorageTexture } from "three/webgpu";
+import type { Renderer } from "three/webgpu";
 import { SrbfError } from "../../errors";
 import { ACROSS, type Gather, weightRows } from "../../gather";
 import type { Triple } from "../../matrix";
@@ -25,8 +25,12 @@ import { cleared, disposeOf, floatTarget, type Pass, pass, render } from "./pass
 
 const { Fn, If, int, ivec2, screenCoordinate, texture, textureLoad, uniform, vec3, vec4, workgroupId } = tsl as Record<string, N>;
 
-/** What view clusters and lobes gather of a light in white. */
-type Gathered = { texture: Texture; dispose(): void };
+/** What view clusters and lobes gather of a light in white: drawn by a pass into its target, or by a kernel into its texture. */
+interface Gathered {
+  texture: Texture;
+  draw(renderer: Renderer): void;
+  dispose(): void;
+}
 
 export class GatherNodes {
   readonly middle: Triple;
@@ -46,10 +50,8 @@ export class GatherNodes {
   private readonly shown?: Pass;
   /** Rows of the clusters, and of the lobes after them. */
   private readonly rows: [number, number];
-  /** By passes, each with its target; or by kernels, each with its texture. */
-  private readonly unused: Gathered[] = [];
-  private readonly gatherings = new Map<Gathered, (renderer: Renderer) => void>();
   private known = new Map<string, Gathered>();
+  private readonly unused: Gathered[] = [];
   /** The sum of all lights, the first; and what is drawn in turn with it. */
   private readonly sums: [RenderTarget, RenderTarget];
   private readonly adding: [Pass, Pass];
@@ -122,7 +124,7 @@ export class GatherNodes {
   dispose(): void {
     const { exchange, view, gloss } = this.links;
     disposeOf([...this.bounces, ...this.adding, ...(this.shown ? [this.shown] : [])]);
-    for (const one of [this.direct, this.near, exchange, view, gloss, this.shown?.target, ...this.textures, ...this.radiosity, ...this.sums, ...this.gatherings.keys()]) one?.dispose();
+    for (const one of [this.direct, this.near, exchange, view, gloss, this.shown?.target, ...this.textures, ...this.radiosity, ...this.sums, ...this.known.values(), ...this.unused]) one?.dispose();
   }
 
   /** Of a light in white. */
@@ -135,7 +137,7 @@ export class GatherNodes {
     for (let term = 0; term < this.gather.terms; ++term) render(renderer, this.bounces[term < 3 ? term : 2 - (term % 2)]);
     if (this.gather.terms === 0) cleared(renderer, this.radiosity[0]);
     if (this.shown) render(renderer, this.shown);
-    this.gatherings.get(gathered)?.(renderer);
+    gathered.draw(renderer);
     ++this.computed;
     return gathered;
   }
@@ -147,23 +149,26 @@ export class GatherNodes {
     return near?.sources(surfels.cells.under(light, this.occluders, FAR, surfels.cells.count), "position" in light ? light.position : undefined);
   }
 
-  /** A pass with its target, or a kernel with its texture. */
   private made(): Gathered {
     const size = [ACROSS, this.rows[0] + this.rows[1]] as const;
     if (this.computes) {
       const made = floatStorage(...size);
       const kernel = summingKernel(made, () => ivec2(int(workgroupId.x), int(workgroupId.y)), (at, thread) => this.gathered(at, thread), (sum, at) => sum.add(this.beside(at)));
-      const gathered = { texture: made as StorageTexture, dispose: () => [made, kernel].forEach((one) => one.dispose()) };
-      this.gatherings.set(gathered, (renderer) => compute(renderer, kernel, [...size, 1]));
-      return gathered;
+      return { texture: made, draw: (renderer) => compute(renderer, kernel, [...size, 1]), dispose: () => [made, kernel].forEach((one) => one.dispose()) };
     }
-    const one = pass(Fn(() => {
+    const node = Fn(() => {
       const at = ivec2(screenCoordinate).toVar();
       return vec4(this.gathered(at).add(this.beside(at)), 1);
-    })(), floatTarget(...size));
-    const gathered = { texture: one.target.texture, dispose: () => (disposeOf([one]), one.target.dispose()) };
-    this.gatherings.set(gathered, (renderer) => render(renderer, one));
-    return gathered;
+    })();
+    const one = pass(node, floatTarget(...size));
+    return {
+      texture: one.target.texture,
+      draw: (renderer) => render(renderer, one),
+      dispose: () => {
+        disposeOf([one]);
+        one.target.dispose();
+      },
+    };
   }
 
   /** What a cluster or a lobe gathers by its links, or what one thread adds to it. */
