@@ -18,6 +18,7 @@ from blender_bake.pbr_material import PbrMaterial, pbr_material_of
 from blender_bake.receiver_objects import prepare
 from blender_bake.unwrap import layer_coordinates
 from blender_bake.vertex_albedo import AlbedoBakes
+from blender_bake.vertices import texel_middles
 
 SHORTEST = 1e-12
 
@@ -25,7 +26,8 @@ SHORTEST = 1e-12
 def response(scene: bpy.types.Scene, job: dict[str, Any]) -> dict[str, Any]:
     """What `job["mesh"]` asks for: `parts`, `materials` and `camera`.
 
-    mesh.receivers: those of a capture, {object, uv_layer, per_loop: a file of (loops, 2) coordinates where the bake made the layer}
+    mesh.receivers: those of a capture: {object, uv_layer, per_loop: a file of (loops, 2) coordinates where the bake made the layer}, or
+        {object, vertices: their number}
     parts: {object, material (index), file, columns: [[name, width], ...]}: float32 rows of every corner, three per triangle; columns are
         position, normal, uv (of the layer that renders), lightmap (a receiver's), color (baked albedo), the last three optional
     materials: see `PbrMaterial.record`
@@ -70,13 +72,20 @@ class _Piece:
 
 
 def _lightmaps(scene: bpy.types.Scene, receivers: list[dict[str, Any]], scratch: Path) -> dict[str, np.ndarray]:
-    """(loops, 2) lightmap coordinates, v up, of each receiver, whose modifiers are applied as a bake applies them."""
+    """(loops, 2) coordinates in the image of each receiver, v up; its modifiers are applied as a bake applies them."""
     prepare(scene, [receiver["object"] for receiver in receivers])
     found = {}
     for receiver in receivers:
-        name, layer = receiver["object"], receiver["uv_layer"]
+        name, layer = receiver["object"], receiver.get("uv_layer")
         mesh = scene.objects[name].data
-        if receiver["per_loop"] is not None:
+        if "vertices" in receiver:
+            if len(mesh.vertices) != receiver["vertices"]:
+                raise WorkerError(
+                    f"expected {name!r} with the {receiver['vertices']} vertices of the capture, found {len(mesh.vertices)}; "
+                    "give the .blend that it was baked from"
+                )
+            found[name] = texel_middles(mesh)
+        elif receiver["per_loop"] is not None:
             found[name] = np.load(scratch / receiver["per_loop"])
             if found[name].shape != (len(mesh.loops), 2):
                 raise WorkerError(

@@ -28,6 +28,15 @@ def image_size(count: int) -> tuple[int, int]:
     return width, max(1, -(-count // width))
 
 
+def texel_middles(mesh: bpy.types.Mesh) -> np.ndarray:
+    """(loops, 2) where each corner's vertex is in the image that lists them, v up."""
+    width, height = image_size(len(mesh.vertices))
+    vertices = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    row, column = np.divmod(vertices, width)
+    return np.stack([(column + 0.5) / width, 1 - (row + 0.5) / height], axis=1).astype(np.float32)
+
+
 class VertexReceiver:
     """The vertices of one mesh object, its modifiers applied, in vertex order along the rows; arrays are (H, W, C) float32.
 

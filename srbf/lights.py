@@ -375,6 +375,28 @@ class EnvironmentLight:
         object.__setattr__(self, "image", image)
         object.__setattr__(self, "color", triple(self.color, "color"))
 
+    def turned(self, angle: float) -> EnvironmentLight:
+        """The map turned about the world's vertical.
+
+        Parameters
+        ----------
+        angle
+            Radians, counterclockwise seen from above.
+
+        Returns
+        -------
+        EnvironmentLight
+            What shone from azimuth a shines from a + `angle`.
+
+        Examples
+        --------
+        >>> overcast = EnvironmentLight(np.full((8, 16, 3), 0.5, np.float32)).turned(np.pi / 2)
+        >>> (overcast.rotation @ [1.0, 0.0, 0.0]).round(6).tolist()
+        [0.0, 1.0, 0.0]
+        """
+        c, s = np.cos(float(angle)), np.sin(float(angle))
+        return replace(self, rotation=np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ self.rotation)
+
 
 def radius_of(light: object) -> float:
     """The radius of a light that is a sphere, m; 0 of others."""

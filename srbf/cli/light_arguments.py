@@ -95,9 +95,9 @@ def with_falloff(lights: Sequence[Light], falloff: Falloff) -> list[Light]:
     ]
 
 
-def read_environment(path: Path) -> EnvironmentLight:
-    """An equirectangular EXR or picture, its values taken as linear. What was done that is not plain is a warning."""
-    return EnvironmentLight(_linear(path))
+def read_environment(path: Path, turn: float = 0.0) -> EnvironmentLight:
+    """An equirectangular EXR or picture, its values taken as linear, turned about +z (rad). What is not plain is a warning."""
+    return EnvironmentLight(_linear(path)).turned(turn)
 
 
 def read_profile(path: Path) -> Profile:
@@ -139,7 +139,7 @@ def _light(entry: dict[str, Any], folder: Path, falloff: Falloff, profiles: Prof
     if entry["kind"] != "environment":
         return light_of(entry, falloff, profiles)
     fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key != "kind"}
-    return EnvironmentLight(_linear(folder / fields.pop("file")), **fields)
+    return replace(read_environment(folder / fields.pop("file"), fields.pop("turn", 0.0)), **fields)
 
 
 def _linear(path: Path, transfer: Literal["linear", "srgb"] = "linear") -> np.ndarray:

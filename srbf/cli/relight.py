@@ -112,6 +112,14 @@ def relight(
     environment: Annotated[
         list[Path] | None, typer.Option(metavar="IMAGE", help="Equirectangular environment map. Repeats.", show_default=False)
     ] = None,
+    turn: Annotated[
+        float,
+        typer.Option(
+            metavar="RADIANS",
+            parser=Number(low=-1e3, high=1e3),
+            help="Of environment maps, about the vertical, counterclockwise seen from above.",
+        ),
+    ] = 0.0,
     reference_distance: Annotated[
         float, typer.Option(metavar="METERS", parser=POSITIVE, help="Distance a0 at which a light inside the scene has its color.")
     ] = 1.0,
@@ -235,6 +243,8 @@ def relight(
             "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment, "
             "--scene-lights or --ambient-only"
         )
+    if turn and not environment:
+        raise typer.BadParameter("expected --environment with --turn, found none; add one, or put `turn` into FRAMES.json")
     if reference is not None and (lights is not None or at is not None or harmonics or not ambient):
         raise typer.BadParameter("expected --reference without --lights, --at, --harmonics and --no-ambient, found both; leave one out")
     for flag, value in (("--samples", samples), ("--blender", blender)):
@@ -256,7 +266,7 @@ def relight(
         frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff, known)
         _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps, shadows, harmonics)
         return
-    placed += map(read_environment, environment or [])
+    placed += (read_environment(path, turn) for path in environment or [])
     for written in [output] if reference is None else [output, path_beside(output)]:
         check_image_output(written, force)
     opened = _opened(asset, painted, ambient)

@@ -52,7 +52,8 @@ def write_scene_mesh(
     """Write the rendered objects of a .blend to `output`, a .glb, atomically: of its scene `scene_name`, else of the capture's
     scene, else of the active one.
 
-    With a lightmap's `capture`, its receivers get TEXCOORD_1, and its albedo for a base color. InputError on what cannot be used,
+    With a `capture` of a lightmap, its receivers get TEXCOORD_1, and its albedo for a base color; one of vertices has the middles of their
+    texels there. InputError on what cannot be used,
     BakeError where Blender fails or the scene is not the one of the capture, OutputExistsError where `output` may not be replaced.
     """
     if output.suffix.lower() != SUFFIX:
@@ -64,25 +65,28 @@ def write_scene_mesh(
     opened = None if capture is None else Capture.open(capture)
     if scene_name is None and opened is not None:
         scene_name = opened.manifest.get("source", {}).get("settings", {}).get("scene")
-    receivers = [] if opened is None else lightmap_receivers(opened)
+    receivers = [] if opened is None else mesh_receivers(opened)
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
         told = _ask(scene, scene_name, scratch, receivers, {} if opened is None else made_layers(opened, receivers), blender, say)
-        made = _Writer(told, scratch, None if opened is None else opened.geometry("albedo"))
+        has_texels = opened is not None and "uv_layer" in receivers[0]
+        made = _Writer(told, scratch, opened.geometry("albedo") if opened is not None and has_texels else None)
         data = made.document.pack()
     with files.atomic_path(output) as temporary:
         temporary.write_bytes(data)
     return made.summary(len(data))
 
 
-def lightmap_receivers(capture: Capture) -> list[dict[str, Any]]:
-    """The objects of a lightmap's capture and their UV layers, from its manifest; InputError on another kind of capture."""
+def mesh_receivers(capture: Capture) -> list[dict[str, Any]]:
+    """The objects of a capture of a lightmap and their UV layers, or of vertices and their number; InputError on another kind."""
     manifest = capture.manifest
     found = manifest.get("receivers") or [manifest.get("receiver", {})]
     kinds = {str(one.get("kind", "none")) for one in found}
-    if kinds != {"lightmap"} or not all("object" in one and "uv_layer" in one for one in found):
+    needed = {"lightmap": {"object", "uv_layer"}, "vertices": {"object", "count"}}.get("".join(kinds))
+    if needed is None or not all(needed <= one.keys() for one in found):
         raise InputError(
-            f"expected a lightmap's capture at {capture.folder}, found one of kind {', '.join(sorted(kinds))}; leave `capture` out"
+            f"expected a capture of a lightmap or vertices at {capture.folder}, found one of kind {', '.join(sorted(kinds))}; "
+            "leave `capture` out"
         )
     return found
 
@@ -113,6 +117,9 @@ def _ask(
     """The worker's description of the scene; the arrays are in `scratch`."""
     asked = []
     for i, receiver in enumerate(receivers):
+        if receiver["kind"] == "vertices":
+            asked.append({"object": receiver["object"], "vertices": receiver["count"]})
+            continue
         per_loop = None
         if receiver["object"] in made:
             per_loop = f"uv_{i}.npy"

@@ -28,7 +28,7 @@ from srbf.methods.relighting_map import RelightingMap
 pytestmark = pytest.mark.blender
 
 FLOAT32 = 1e-5  # of meters and UVs a few units large
-SMALL = {"width": 64, "height": 64, "lights": 4, "samples": 1, "validation": 0, "holdout": 1, "holdout_samples": 1}
+SMALL = {"lights": 4, "samples": 1, "validation": 0, "holdout": 1, "holdout_samples": 1}
 BYTE = 0.5 / 255 * 2.4  # half a step of a byte where the sRGB curve is flattest, in linear light
 
 
@@ -63,7 +63,8 @@ class Scene:
 
 
 def baked(scene: Path, folder: Path, receiver: Receiver) -> Capture:
-    Bake(scene, folder, BakeSettings(receiver, quantity="irradiance", **SMALL)).run(Reporter())
+    size = {"width": 8, "height": 1} if receiver.kind == "vertices" else {"width": 64, "height": 64}
+    Bake(scene, folder, BakeSettings(receiver, quantity="irradiance", **size, **SMALL)).run(Reporter())
     return Capture.open(folder)
 
 
@@ -217,6 +218,18 @@ def test_layers_that_a_bake_made_find_their_texels(scene: Callable[[str], Path],
         tested += there.sum()
     assert tested > 100
     assert "TEXCOORD_1" not in found.primitives("Plate")[0]
+
+
+def test_vertices_find_their_own_texels(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    """At every corner the capture's position of that texel is the corner's own; its surroundings have none."""
+    capture = baked(scene("kit"), tmp_path / "capture", Receiver("vertices", "Doubled"))
+    made = write_scene_mesh(scene("kit"), tmp_path / "scene.glb", capture.folder)
+    assert made.receivers == ("Doubled",)
+    found, position = Scene(tmp_path / "scene.glb"), capture.geometry("position")
+    (primitive,) = found.primitives("Doubled")
+    u, v = primitive["TEXCOORD_1"].reshape(-1, 2).T
+    there = position[(v * position.shape[0]).astype(int), (u * position.shape[1]).astype(int)]
+    np.testing.assert_allclose(there, primitive["POSITION"].reshape(-1, 3), atol=1e-4)
 
 
 def test_glass_rings_a_pawn_and_gold(folder: Path) -> None:

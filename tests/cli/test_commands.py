@@ -117,6 +117,8 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
         "-0.2,0.1,0.8",
         "--environment",
         tmp_path / "environment.exr",
+        "--turn",
+        -0.6,
     ]
     flags += ["--spot", "0,0,1,0,0,-1,0.2,0.5,2,2,2", "--reference-distance", 0.7, "--falloff", "inverse-square", "--renderer", renderer]
     ok("relight", asset, "-o", tmp_path / "out.exr", *flags)
@@ -124,7 +126,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
         DirectionalLight((-1, 0, 1), (1, 0.5, 0.2)),
         DirectionalLight((0, 0, 1)),
         PointLight((-0.2, 0.1, 0.8), a0=0.7, falloff="inverse-square"),
-        EnvironmentLight(environment),
+        EnvironmentLight(environment).turned(-0.6),
         SpotLight((0, 0, 1), (2, 2, 2), direction=(0, 0, -1), inner=0.2, outer=0.5, a0=0.7, falloff="inverse-square"),
     ]
     expected = methods.relight(Asset.open(asset), lights)
@@ -150,12 +152,13 @@ def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_
 
 
 def test_frames(asset: Path, tmp_path: Path) -> None:
-    write_image(tmp_path / "environment.exr", np.ones((4, 8, 3), np.float32), "float")
+    around = np.random.default_rng(9).random((4, 8, 3)).astype(np.float32)
+    write_image(tmp_path / "environment.exr", around, "float")
     spot = {"kind": "spot", "position": [0, 0, 1], "direction": [0, 0, -1], "inner": 0.1, "outer": 0.4}
     point = {"kind": "point", "position": [0, 0, 1], "color": [1, 2, 3], "a0": 2, "falloff": "inverse-square"}
     frames = [
         [{"kind": "directional", "direction": [0, 0, 3], "color": [1, 1, 1]}, point],
-        [spot, {"kind": "environment", "file": "environment.exr"}],
+        [spot, {"kind": "environment", "file": "environment.exr", "turn": 2.5}],
         [],
     ]
     (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": lights} for lights in frames]}))
@@ -168,6 +171,8 @@ def test_frames(asset: Path, tmp_path: Path) -> None:
     for number, lights in enumerate(read_frames(tmp_path / "frames.json")):
         np.testing.assert_array_equal(read_image(tmp_path / "out" / f"{number:04d}.exr"), methods.relight(opened, lights))
     assert not read_image(tmp_path / "out" / "0002.exr").any()
+    (read,) = (light for light in read_frames(tmp_path / "frames.json")[1] if isinstance(light, EnvironmentLight))
+    np.testing.assert_array_equal(methods.relight(opened, [read]), methods.relight(opened, [EnvironmentLight(around).turned(2.5)]))
 
 
 @pytest.mark.parametrize(
@@ -268,6 +273,11 @@ def test_bad_lights(tmp_path: Path, arguments: list[str], words: str) -> None:
     """Wrong usage: no asset is looked at."""
     assert words in misused("relight", tmp_path / "none", "-o", tmp_path / "x.exr", *arguments)
     assert not (tmp_path / "x.exr").exists()
+
+
+def test_a_turn_of_no_environment(asset: Path, tmp_path: Path) -> None:
+    line = refused("relight", asset, "-o", tmp_path / "x.exr", "--directional", "0,0,1", "--turn", "1", status=2)
+    assert "expected --environment with --turn, found none" in line
 
 
 def test_an_environment_map_that_is_not_there(asset: Path, tmp_path: Path) -> None:

@@ -50,14 +50,14 @@ def test_scene_and_output(scene: Path, tmp_path: Path) -> None:
     ("receiver", "found"),
     [
         ({"kind": "view", "camera": "Camera"}, "view"),
-        ({"kind": "vertices", "object": "Bust", "count": 3}, "vertices"),
+        ({"kind": "probes", "count": 3}, "probes"),
         (None, "none"),  # photographs
     ],
 )
 def test_a_capture_of_another_kind(scene: Path, capture: Capture, tmp_path: Path, receiver: dict | None, found: str) -> None:
     folder = described(capture, **({"receiver": receiver} if receiver else {}))
     line = refused("mesh", scene, "-o", tmp_path / "scene.glb", "--capture", folder)
-    assert f"expected a lightmap's capture at {folder}, found one of kind {found}; leave --capture out" in line
+    assert f"expected a capture of a lightmap or vertices at {folder}, found one of kind {found}; leave --capture out" in line
     assert not (tmp_path / "scene.glb").exists()
 
 

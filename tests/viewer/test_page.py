@@ -224,9 +224,20 @@ def test_given_environments_shine_from_the_start(chromium: Any, asset: Asset, bu
     assert done.exit_code == 0, done.output
     chromium("open", url=page.as_uri() + PICTURE + ",'exposure':-2}", width=WIDTH, height=HEIGHT)
     assert shows(chromium, asset, [EnvironmentLight(maps[0])], exposure=-2)
-    second = ",'exposure':-2,'lights':[{'kind':'environment','on':true,'color':'%23ffffff','intensity':1,'file':'around%201.exr'}]}"
-    chromium("open", url=page.as_uri() + PICTURE + second, width=WIDTH, height=HEIGHT)
+    second = "'lights':[{'kind':'environment','on':true,'color':'%23ffffff','intensity':1,'file':'around%201.exr'}]"
+    chromium("open", url=page.as_uri() + PICTURE + f",'exposure':-2,'path':'turn','seconds':1,{second}}}", width=WIDTH, height=HEIGHT)
     assert shows(chromium, asset, [EnvironmentLight(maps[1])], exposure=-2)
+    chromium("number", name="Turn (°)", value=50)
+    assert shows(chromium, asset, [EnvironmentLight(maps[1]).turned(np.radians(50))], exposure=-2)
+    frames = lights_of(chromium, tmp_path, "Path (FRAMES.json)")
+    assert len(frames) == 24
+    assert shows(chromium, asset, frames[0], exposure=-2)
+    sixth = relight(asset, frames[6])
+    np.testing.assert_allclose(sixth, relight(asset, [EnvironmentLight(maps[1]).turned(np.radians(140))]), atol=1e-3 * sixth.max())
+    told = {"frames": [json.loads((tmp_path / "FRAMES.json").read_text())["frames"][6]]}
+    chromium("drop", name="FRAMES.json", bytes=base64.b64encode(json.dumps(told).encode()).decode())
+    assert chromium.state()["lights"][0]["turn"] == pytest.approx(140)
+    assert shows(chromium, asset, frames[6], exposure=-2)
     again = CliRunner().invoke(app, ["view", str(tmp_path / "asset"), "--save", str(tmp_path / "b.html"), *flags[:2], *flags[:2]])
     assert again.exit_code == 1
     assert "two of around 0.exr" in again.output

@@ -102,6 +102,38 @@ def test_a_lightmap_lies_in_its_scene_and_glass_shows_what_is_behind(chromium: A
     np.testing.assert_allclose(at(alone, [0.75, 0.0, z]), shown_as(irradiance, EXPOSURE), atol=2)
 
 
+def test_light_of_vertices_is_mixed_across_triangles(
+    chromium: Any, make_asset: Callable[..., Asset], tmp_path: Path, serve: Callable
+) -> None:
+    """Whatever texels the vertices have: in the scene and alone."""
+    asset = complete(
+        on_a_plane(make_asset(k=4, height=2, width=8, encoding="half")), receiver={"kind": "vertices", "object": "Table", "count": 12}
+    )
+    asset.images["coverage"] = np.ones((2, 8), np.float32)
+    asset.stored[:] = np.abs(asset.stored.astype(np.float32)) * 0.3 + 0.1
+    asset.save(tmp_path / "asset")
+    a, b, z = HALF_EXTENT
+    vertices = np.array([9, 2, 4, 9, 4, 11])  # of the corners
+    uv = np.stack([(vertices % 8 + 0.5) / 8, (vertices // 8 + 0.5) / 2], axis=1)
+    plain = {"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0, "baseColorFactor": [*ALBEDO, 1]}}
+    post = ("Post", quad([-2.2, -0.3, z], [-1.7, -0.3, z], [-1.7, 0.3, z], [-2.2, 0.3, z]), plain)
+    table = ("Table", quad([-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]), plain)
+    (tmp_path / "scene.glb").write_bytes(scene_glb(table, post, uv=("Table", uv)))
+    where = f"#{{'eye':[{EYE.tolist()},{TARGET.tolist()}],'selected':-1,'exposure':{EXPOSURE}}}"
+    chromium("open", url=serve(tmp_path / "asset", None, tmp_path / "scene.glb") + where, width=WIDTH, height=HEIGHT)
+    light = relight(asset, [SUN]).reshape(-1, 3)[vertices].reshape(2, 3, 3)
+    in_scene = saved(chromium, tmp_path)
+    chromium("press", keys=["t"])
+    alone = saved(chromium, tmp_path)
+    assert chromium.state()["view"] == "mesh"
+    for corners, values in zip(table[1], light, strict=True):
+        shares = np.array([0.5, 0.2, 0.3])
+        place, mixed = shares @ corners, shares @ values
+        assert np.ptp(values, axis=0).max() > 0.1
+        np.testing.assert_allclose(at(in_scene, place), shown_as(mixed * ALBEDO / np.pi, EXPOSURE), atol=3)
+        np.testing.assert_allclose(at(alone, place), shown_as(mixed, EXPOSURE), atol=3)
+
+
 def test_light_and_camera_move_together(chromium: Any, table: Asset, page: str, tmp_path: Path) -> None:
     """The light goes round while the camera does; both are in the address, and the picture is that of where they are."""
     where = f"#{{'eye':[{EYE.tolist()},{TARGET.tolist()}],'exposure':{EXPOSURE},'path':'turn','seconds':2,'turntable':true,'playing':true}}"

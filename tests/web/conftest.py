@@ -94,5 +94,6 @@ def as_json(light: Light | dict[str, Any]) -> dict[str, Any]:
         return light
     if isinstance(light, EnvironmentLight):
         height, width = light.image.shape[:2]
-        return {"kind": "environment", "width": width, "height": height, "pixels": light.image.ravel().tolist(), "color": light.color}
+        told = {"kind": "environment", "width": width, "height": height, "pixels": light.image.ravel().tolist(), "color": light.color}
+        return {**told, "turn": float(np.arctan2(light.rotation[1, 0], light.rotation[0, 0]))}
     return {"kind": KINDS[type(light)], **asdict(light)}

@@ -76,7 +76,8 @@ def told(*lights: Light) -> list[dict[str, Any]]:
     around = [light for light in lights if isinstance(light, EnvironmentLight)]
     if around:
         height, width, _ = around[0].image.shape
-        map_of = {"kind": "environment", "color": around[0].color, "width": width, "height": height}
+        turn = float(np.arctan2(around[0].rotation[1, 0], around[0].rotation[0, 0]))
+        map_of = {"kind": "environment", "color": around[0].color, "width": width, "height": height, "turn": turn}
         return [{**map_of, "pixels": around[0].image.ravel().tolist()}, *told(*(light for light in lights if light not in around))]
     return [{"kind": NAMES[type(light)], **asdict(light), **shape_of(light)} for light in lights]
 
@@ -184,7 +185,7 @@ def test_an_environment_reaches_surfels_as_in_numpy(browser: Any, asset: Asset, 
     rng = np.random.default_rng(12)
     image = rng.uniform(0, 2, (40, 70, 3)).astype(np.float32) * np.linspace(2, 0.1, 40, dtype=np.float32)[:, None, None]
     image[5:9, 10:14] += 60
-    around = EnvironmentLight(image, (0.5, 0.8, 1.0))
+    around = EnvironmentLight(image, (0.5, 0.8, 1.0)).turned(0.4)
     c, s = np.cos(0.4), np.sin(0.4)
     matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, c, -s, 0.0], [0.0, s, c, 0.0], [0.0, 0.0, 0.0, 1.0]]
     turned = replace(asset, manifest={**asset.manifest, "asset_from_world": matrix})

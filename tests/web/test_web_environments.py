@@ -35,12 +35,12 @@ def expected_of(made: Room, table: np.ndarray, lights: list[dict[str, Any]]) -> 
     shapes = np.einsum("rkc,kc->rc", 2 * made.files["transfer.exr"][0], np.sum(inside, axis=0)) if inside else 0
     for light in lights:
         if light["kind"] == "environment":
-            radiance = cell_radiance(EnvironmentLight(MAP, tuple(light["color"])), SIDE)[CELLS]
+            radiance = cell_radiance(EnvironmentLight(MAP, tuple(light["color"])).turned(light.get("turn", 0)), SIDE)[CELLS]
             shapes = shapes + np.einsum("rkc,kc->rc", table, radiance)
     return np.maximum(made.response(np.einsum("fr,rc->fc", made.files["light_values.exr"][0][..., 0], shapes)), 0)
 
 
-SETS = [[ENVIRONMENT], [*LIGHTS["point"], ENVIRONMENT, {**ENVIRONMENT, "color": [1, 0.2, 0.1]}], LIGHTS["spot"]]
+SETS = [[ENVIRONMENT], [*LIGHTS["point"], ENVIRONMENT, {**ENVIRONMENT, "color": [1, 0.2, 0.1], "turn": -2.2}], LIGHTS["spot"]]
 
 
 @pytest.mark.parametrize(

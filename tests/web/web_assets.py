@@ -23,7 +23,7 @@ LIGHTS: dict[str, list[Light]] = {
     "spot": [
         SpotLight((-0.5, 0.6, 1.2), (1.0, 0.9, 0.3), a0=1.5, falloff="inverse-square", direction=(0.4, -0.5, -1), inner=0.3, outer=0.8)
     ],
-    "environment": [EnvironmentLight(np.random.default_rng(5).random((6, 12, 3)).astype(np.float32), (0.5, 0.6, 0.7))],
+    "environment": [EnvironmentLight(np.random.default_rng(5).random((6, 12, 3)).astype(np.float32), (0.5, 0.6, 0.7)).turned(0.8)],
 }
 LIGHTS["several"] = [light for lights in LIGHTS.values() for light in lights] + [
     DirectionalLight((-0.8, 0.1, 0.4), (0.1, 0.3, 0.9)),

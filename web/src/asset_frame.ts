@@ -1,6 +1,5 @@
 /** Lights brought into the asset's frame: the one place where the package does it. */
 import type { Asset } from "./asset";
-import { environmentSamples } from "./environment";
 import { SrbfError } from "./errors";
 import { type AreaLight, type EnvironmentLight, isPunctual, type Light, moved, type NamedLight, type PunctualLight } from "./lights";
 import { lightDomainOf } from "./manifest";
@@ -11,9 +10,8 @@ import { type EnvironmentDirections, environmentDirections } from "./environment
 export type DistantLight = readonly [direction: Triple, color: Triple];
 
 export interface LightsInAssetFrame {
-  /** Directional lights and, of assets of directions, the texels of environments, made as they are asked for, once. */
-  readonly distant: Iterable<DistantLight>;
-  /** Environments around lights inside a scene, in the asset's world. */
+  readonly distant: readonly DistantLight[];
+  /** In the asset's world, but around a pool of surfels. */
   readonly environments: readonly EnvironmentLight[];
   /** Environments around a pool of surfels, as distant lights. */
   readonly environmentDirections: readonly EnvironmentDirections[];
@@ -43,16 +41,11 @@ export function inAssetFrame(asset: Pick<Asset, "manifest" | "assetFromWorld">, 
   if (domain === "directions" && lights.some((light) => isPunctual(light) && light.profile)) {
     throw new SrbfError("expected lights without a profile for this asset, found one; capture the scene with --light-set surfels or gather");
   }
-  function* distant(): Generator<DistantLight> {
-    for (const light of lights) {
-      if (light.kind === "directional") yield [moved(light, assetFromWorld).direction, light.color];
-      if (light.kind === "environment" && domain === "directions") yield* environmentSamples(light, manifest.domain, assetFromWorld);
-    }
-  }
+  const maps = lights.filter((light) => light.kind === "environment");
   return {
-    distant: distant(),
-    environments: domain === "directions" || domain === "pool" ? [] : lights.filter((light) => light.kind === "environment"),
-    environmentDirections: domain === "pool" ? lights.filter((light) => light.kind === "environment").map((light) => environmentDirections(light, assetFromWorld)) : [],
+    distant: lights.filter((light) => light.kind === "directional").map((light) => [moved(light, assetFromWorld).direction, light.color]),
+    environments: domain === "pool" ? [] : maps,
+    environmentDirections: domain === "pool" ? maps.map((light) => environmentDirections(light, assetFromWorld)) : [],
     assetFromWorld,
     punctual: lights.filter(isPunctual).map((light) => moved(light, assetFromWorld)),
     areas: lights.filter((light) => light.kind === "area").map((light) => moved(light, assetFromWorld)),

@@ -2,7 +2,7 @@
 import { SrbfError } from "./errors";
 import { decodeFloat, decodeHalf } from "./exr";
 import type { AssetFiles } from "./files";
-import { addProjected, type LightFunctions } from "./light_functions";
+import { LightFunctions } from "./light_functions";
 import type { Manifest } from "./manifest";
 import type { Triple } from "./matrix";
 import type { Fail, Tables } from "./methods/method";
@@ -49,7 +49,7 @@ export async function readCoefficientMaps(
   }
   const rgb = new Float32Array(3 * count * centers.length);
   for (let i = 0; i < count * centers.length; ++i) rgb.set(coefficients.data.subarray(4 * i, 4 * i + 3), 3 * i);
-  const functions: LightFunctions = { centers, spreads, coefficients: rgb };
+  const functions = new LightFunctions(centers, spreads, rgb, manifest.domain);
   return {
     centers,
     maps: components,
@@ -58,11 +58,7 @@ export async function readCoefficientMaps(
     integers: { srbfTableSize: size },
     textures: { srbfTable: table },
     weights: { kind: "texture", width: components + 1, height: clusters },
-    projectedWeights({ distant }) {
-      const projected = new Float64Array(3 * count);
-      addProjected(functions, distant, projected);
-      return projected;
-    },
+    projectedWeights: (lights) => functions.projected(lights),
     sum: (kit, uv, receiver) => sum(kit, { components, size, columns: table.width / size }, clusterAt, uv, receiver),
   };
 }

@@ -1,7 +1,7 @@
 /** An equirectangular map as many directional lights: `srbf.light_geometry.environment_samples`. */
 import type { DistantLight } from "./asset_frame";
 import type { EnvironmentLight } from "./lights";
-import { determinant, type Matrix4, type Triple, turned } from "./matrix";
+import { determinant, type Matrix4, multiplied, type Triple, turned } from "./matrix";
 
 const UPRIGHT = 1e-8; // how far the rotated zenith may be from (0, 0, 1), as in numpy.allclose
 
@@ -19,18 +19,32 @@ export interface EnvironmentTexel {
  */
 export function* environmentSamples(light: EnvironmentLight, domain: "sphere" | "hemisphere", assetFromWorld: Matrix4): Generator<DistantLight> {
   const { width, height, pixels, color } = light;
-  for (const { direction, solidAngle, row, column } of environmentTexels(width, height, domain, assetFromWorld)) {
+  for (const { direction, solidAngle, row, column } of environmentTexels(width, height, domain, mapFrame(light, assetFromWorld))) {
     const at = 3 * (row * width + column);
     yield [direction, [pixels[at] * solidAngle * color[0], pixels[at + 1] * solidAngle * color[1], pixels[at + 2] * solidAngle * color[2]]];
   }
 }
 
-/** The texels of a map of this size. */
-export function* environmentTexels(width: number, height: number, domain: "sphere" | "hemisphere", assetFromWorld: Matrix4): Generator<EnvironmentTexel> {
-  const scale = Math.cbrt(determinant(assetFromWorld));
-  const rotation = assetFromWorld.map((row) => row.map((value) => value / scale));
-  const up = rotation[2];
-  const upright = Math.abs(up[0]) <= UPRIGHT && Math.abs(up[1]) <= UPRIGHT && Math.abs(up[2] - 1) <= 1e-5;
+/** From a map's own frame, in which it is not turned, to the asset's. */
+export function mapFrame({ turn = 0 }: EnvironmentLight, assetFromWorld: Matrix4): Matrix4 {
+  const [c, s] = [Math.cos(turn), Math.sin(turn)];
+  return turn === 0 ? assetFromWorld : multiplied(assetFromWorld, [[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]);
+}
+
+/** Whether a rigid motion and uniform scale keeps the zenith. */
+export const isUpright = (matrix: Matrix4): boolean => zenithStays(unscaled(matrix));
+
+const unscaled = (matrix: Matrix4): Matrix4 => {
+  const scale = Math.cbrt(determinant(matrix));
+  return matrix.map((row) => row.map((value) => value / scale));
+};
+
+const zenithStays = ([, , up]: Matrix4): boolean => Math.abs(up[0]) <= UPRIGHT && Math.abs(up[1]) <= UPRIGHT && Math.abs(up[2] - 1) <= 1e-5;
+
+/** The texels of a map of this size; `assetFromMap` turns their directions. */
+export function* environmentTexels(width: number, height: number, domain: "sphere" | "hemisphere", assetFromMap: Matrix4): Generator<EnvironmentTexel> {
+  const rotation = unscaled(assetFromMap);
+  const upright = zenithStays(rotation);
   const cut = domain === "hemisphere" && upright;
   const elevation = (row: number) => {
     const angle = Math.PI / 2 - row * (Math.PI / height);

@@ -1,6 +1,6 @@
 /** An environment map as few distant lights, for surfaces inside a scene: `srbf.visibility.received.ReceivedLight`. */
 import type { DistantLight } from "./asset_frame";
-import { environmentTexels } from "./environment";
+import { environmentTexels, mapFrame } from "./environment";
 import type { EnvironmentLight } from "./lights";
 import type { Matrix4, Triple } from "./matrix";
 
@@ -15,21 +15,23 @@ export interface EnvironmentDirections {
 
 const known = new WeakMap<object, Map<string, readonly DistantLight[]>>(); // by the map's pixels and the frame: a map of millions is summed once
 
-export function environmentDirections({ pixels, width, height, color }: EnvironmentLight, assetFromWorld: Matrix4): EnvironmentDirections {
+export function environmentDirections(light: EnvironmentLight, assetFromWorld: Matrix4): EnvironmentDirections {
+  const { pixels, width, height, color } = light;
+  const frame = mapFrame(light, assetFromWorld);
   const own = known.get(pixels as object) ?? new Map<string, readonly DistantLight[]>();
   known.set(pixels as object, own);
-  const key = JSON.stringify([width, height, assetFromWorld]);
-  const directions = own.get(key) ?? blocksOf({ pixels, width, height }, assetFromWorld);
+  const key = JSON.stringify([width, height, frame]);
+  const directions = own.get(key) ?? blocksOf({ pixels, width, height }, frame);
   own.set(key, directions);
   return { kind: "environment-directions", color, directions };
 }
 
 /** The middle of each block of a map, and what shines from all of it. */
-function blocksOf({ pixels, width, height }: Pick<EnvironmentLight, "pixels" | "width" | "height">, assetFromWorld: Matrix4): DistantLight[] {
+function blocksOf({ pixels, width, height }: Pick<EnvironmentLight, "pixels" | "width" | "height">, assetFromMap: Matrix4): DistantLight[] {
   const [rows, columns] = [Math.ceil(height / ROWS), Math.ceil(width / COLUMNS)];
   const across = Math.ceil(width / columns);
   const sums = new Float64Array(6 * across * Math.ceil(height / rows)); // direction, color
-  for (const { direction, solidAngle, row, column } of environmentTexels(width, height, "sphere", assetFromWorld)) {
+  for (const { direction, solidAngle, row, column } of environmentTexels(width, height, "sphere", assetFromMap)) {
     const at = 6 * (Math.floor(row / rows) * across + Math.floor(column / columns));
     const texel = 3 * (row * width + column);
     for (let k = 0; k < 3; ++k) {

@@ -1,5 +1,5 @@
 /** Environment maps of a transfer asset, without rays: what each cell of directions that its surfels see adds to the weights of the shapes. */
-import { environmentTexels } from "./environment";
+import { environmentTexels, mapFrame } from "./environment";
 import { SrbfError } from "./errors";
 import type { AssetFiles } from "./files";
 import { type LightValues, readTable, summed, type TableEntry } from "./light_values";
@@ -49,7 +49,7 @@ export function cellRadiance(light: EnvironmentLight, side: number, assetFromWor
   const [down, across] = [Math.ceil((ROWS * side) / height), Math.ceil((2 * ROWS * side) / width)];
   const flux = new Float64Array(3 * side ** 2);
   const whole = new Float64Array(side ** 2);
-  for (const { direction, solidAngle, row, column } of environmentTexels(width * across, height * down, "sphere", assetFromWorld)) {
+  for (const { direction, solidAngle, row, column } of environmentTexels(width * across, height * down, "sphere", mapFrame(light, assetFromWorld))) {
     const cell = cellOf(direction, side);
     const at = 3 * (Math.floor(row / down) * width + Math.floor(column / across));
     whole[cell] += solidAngle;

@@ -1,35 +1,45 @@
 /** Smooth RGB functions of light direction, combinations of dense spherical Gaussians: `srbf/basis/light_functions.py`. */
-import type { DistantLight } from "./asset_frame";
-import { gaussian } from "./gaussian";
-import { dot, type Triple } from "./matrix";
+import type { LightsInAssetFrame } from "./asset_frame";
+import { GaussianSums } from "./environment_sums";
+import type { Triple } from "./matrix";
 
 /** F functions over B shared unit centers, each with its own spread (rad); `coefficients` is (F, B, 3), row by row. */
-export interface LightFunctions {
-  readonly centers: readonly Triple[];
-  readonly spreads: readonly number[];
-  readonly coefficients: Float32Array;
-}
+export class LightFunctions {
+  private readonly sums: GaussianSums[];
+  private readonly which: readonly number[]; // of `sums`, for each function
 
-/** sum over lights of color * w_f(direction), added to `projected` (F, 3). */
-export function addProjected(functions: LightFunctions, lights: Iterable<DistantLight>, projected: Float64Array): void {
-  const { centers, spreads, coefficients } = functions;
-  const distinct = [...new Set(spreads)];
-  const b = centers.length;
-  const gathered = distinct.map(() => new Float64Array(3 * b)); // color times R of every center, summed over the lights
-  for (const [direction, color] of lights) {
-    for (let i = 0; i < b; ++i) {
-      const cosine = dot(direction, centers[i]);
-      for (let s = 0; s < distinct.length; ++s) {
-        const weight = gaussian(cosine, distinct[s]);
-        for (let c = 0; c < 3; ++c) gathered[s][3 * i + c] += weight * color[c];
-      }
-    }
+  constructor(
+    private readonly centers: readonly Triple[],
+    spreads: readonly number[],
+    private readonly coefficients: Float32Array,
+    region: "sphere" | "hemisphere",
+  ) {
+    const distinct = [...new Set(spreads)];
+    this.sums = distinct.map((spread) => new GaussianSums(centers, spread, region));
+    this.which = spreads.map((spread) => distinct.indexOf(spread));
   }
-  const index = new Map(distinct.map((spread, s) => [spread, gathered[s]]));
-  for (let f = 0; f < spreads.length; ++f) {
-    const sums = index.get(spreads[f]) as Float64Array;
-    for (let i = 0; i < b; ++i) {
-      for (let c = 0; c < 3; ++c) projected[3 * f + c] += coefficients[3 * (f * b + i) + c] * sums[3 * i + c];
-    }
+
+  /** Sum over distant lights and environments of color times w_f(direction), (F, 3). */
+  projected({ distant, environments, assetFromWorld }: Pick<LightsInAssetFrame, "distant" | "environments" | "assetFromWorld">): Float64Array {
+    const numbers = 3 * this.centers.length;
+    const summed = this.sums.map((sums) => {
+      const own = new Float64Array(numbers);
+      sums.addDistant(distant, own);
+      for (const light of environments) sums.addEnvironment(light, assetFromWorld, own);
+      return own;
+    });
+    const projected = new Float64Array(3 * this.which.length);
+    this.which.forEach((spread, f) => {
+      const own = summed[spread];
+      const coefficients = this.coefficients.subarray(f * numbers, (f + 1) * numbers);
+      let [r, g, b] = [0, 0, 0];
+      for (let i = 0; i < numbers; i += 3) {
+        r += coefficients[i] * own[i];
+        g += coefficients[i + 1] * own[i + 1];
+        b += coefficients[i + 2] * own[i + 2];
+      }
+      projected.set([r, g, b], 3 * f);
+    });
+    return projected;
   }
 }

@@ -67,13 +67,14 @@ export interface AreaLight {
   readonly a0: number;
 }
 
-/** An equirectangular radiance map, `width` x `height` RGB: u = 1/2 - atan2(y, x) / 2 pi, top row first and towards +z. */
+/** An equirectangular radiance map, `width` x `height` RGB: u = 1/2 - atan2(y, x) / 2 pi, top row first and towards +z; `turn`: about +z, rad, counterclockwise seen from above. */
 export interface EnvironmentLight {
   readonly kind: "environment";
   readonly width: number;
   readonly height: number;
   readonly pixels: ArrayLike<number>;
   readonly color: Triple;
+  readonly turn?: number;
 }
 
 /** A light of the scene by its name; `color` is its intensity times its hue, 1 as the scene has it set. */
@@ -132,15 +133,16 @@ export function areaLight(position: Triple, u: Triple, v: Triple, options: { col
   return { kind: "area", position: finite(position, "position"), u, v, color: finite(color, "color"), a0 };
 }
 
-/** @throws SrbfError where `pixels` are not width x height x 3 finite numbers. */
-export function environmentLight(width: number, height: number, pixels: ArrayLike<number>, color: Triple = WHITE): EnvironmentLight {
+/** @throws SrbfError where `pixels` are not width x height x 3 finite numbers, or `turn` is not finite. */
+export function environmentLight(width: number, height: number, pixels: ArrayLike<number>, color: Triple = WHITE, turn = 0): EnvironmentLight {
   if (!(width > 0 && height > 0) || pixels.length !== width * height * 3) {
     throw new SrbfError(`expected ${width} x ${height} x 3 numbers of an environment, found ${pixels.length}; drop alpha, if it has any`);
   }
   for (let i = 0; i < pixels.length; ++i) {
     if (!Number.isFinite(pixels[i])) throw new SrbfError("expected a finite environment image, found NaN or Inf pixels");
   }
-  return { kind: "environment", width, height, pixels, color: finite(color, "color") };
+  if (!Number.isFinite(turn)) throw new SrbfError(`expected a turn in radians, found ${turn}`);
+  return { kind: "environment", width, height, pixels, color: finite(color, "color"), ...(turn ? { turn } : {}) };
 }
 
 /** @throws SrbfError on a color that is not finite. */

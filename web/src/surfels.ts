@@ -116,7 +116,7 @@ export function looksOf(light: Placed, middle: Triple): Look[] {
 
 /** Lights that lay irradiance on cells. */
 export function placed({ punctual, areas, distant, environmentDirections }: LightsInAssetFrame): Placed[] {
-  const suns = [...distant].map(([direction, color]) => ({ kind: "directional", direction, color }) as const);
+  const suns = distant.map(([direction, color]) => ({ kind: "directional", direction, color }) as const);
   return [...punctual, ...areas, ...suns, ...environmentDirections];
 }
 

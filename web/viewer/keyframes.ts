@@ -116,8 +116,9 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
   const common = { on: true, ...own, ...(Object.keys(kept).length ? { kept } : {}), ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
   if (entry.kind === "named") return { kind: "named", ...common, name: typeof entry.name === "string" ? entry.name : bad("a name", entry.name) };
   if (entry.kind === "directional") return { kind: "directional", ...common, direction: rounded(triple("direction")), ...(entry.angle === undefined ? {} : { angle: degrees("angle") }) };
+  if (entry.kind === "environment") return { kind: "environment", ...common, file: typeof entry.file === "string" ? entry.file : bad("a file", entry.file), ...(entry.turn === undefined ? {} : { turn: degrees("turn") }) };
   if (entry.kind === "area") return areaOf(triple("position"), triple("u"), triple("v"), round(number("a0", 1)), common);
-  if (entry.kind !== "point" && entry.kind !== "spot" && entry.kind !== "sphere") return bad("lights of named, directional, point, spot, sphere, area", entry.kind);
+  if (entry.kind !== "point" && entry.kind !== "spot" && entry.kind !== "sphere") return bad("lights of named, directional, point, spot, sphere, area, environment", entry.kind);
   const falloff = (entry.falloff ?? usual) === "inverse-square" ? "inverse-square" : "linear";
   const position = triple("position");
   const axis = triple("direction", entry.kind === "spot" ? undefined : [0, 0, -1]);

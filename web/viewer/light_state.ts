@@ -1,5 +1,5 @@
 /** Lights as the page and its URL hold them: numbers are rounded when they are set, so that page, URL and FRAMES.json agree. */
-import { areaLight, directionalLight, environmentLight, type Light, namedLight, pointLight, type Profile, sphereLight, spotLight, SrbfError, type Triple } from "../src";
+import { areaLight, directionalLight, type EnvironmentLight, environmentLight, type Light, namedLight, pointLight, type Profile, sphereLight, spotLight, SrbfError, type Triple } from "../src";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
 import type { Environment } from "./environment_file";
@@ -72,6 +72,8 @@ export interface AreaState extends Common {
 export interface EnvironmentState extends Common {
   kind: "environment";
   file: string;
+  /** About the vertical, degrees, counterclockwise seen from above. */
+  turn?: number;
 }
 
 /** A light of the scene: intensity 1 and white as it is set there. */
@@ -180,7 +182,7 @@ export function lightOf(state: LightState, environments: ReadonlyMap<string, Env
   if (state.kind === "directional") return directionalLight(state.direction, color, state.angle === undefined ? undefined : (state.angle * Math.PI) / 180);
   if (state.kind === "environment") {
     const image = environments.get(state.file);
-    return image && environmentLight(image.width, image.height, image.pixels, color);
+    return image && { ...checked(image), color, turn: ((state.turn ?? 0) * Math.PI) / 180 };
   }
   if (state.kind === "named") return namedLight(state.name, color);
   if (state.kind === "area") return areaLight(state.position, ...sides(state), { color, a0: state.a0 });
@@ -190,6 +192,15 @@ export function lightOf(state: LightState, environments: ReadonlyMap<string, Env
   if (state.kind === "sphere") return sphereLight(position, state.size, fade);
   const cone = { inner: (state.inner * Math.PI) / 180, outer: (state.outer * Math.PI) / 180 };
   return spotLight(position, aim(state), cone, { ...fade, size: state.size });
+}
+
+const known = new WeakMap<Environment, EnvironmentLight>();
+
+/** A map as a light; its pixels are looked at once. @throws SrbfError on pixels that are not finite. */
+function checked(image: Environment): EnvironmentLight {
+  const light = known.get(image) ?? environmentLight(image.width, image.height, image.pixels);
+  known.set(image, light);
+  return light;
 }
 
 function shapeOf({ profile, direction, roll = 0 }: PointLight, profiles: ReadonlyMap<string, Profile>): { profile?: Profile; direction?: Triple; roll?: number } {
@@ -244,6 +255,7 @@ export function checkLight(value: unknown): LightState {
     if (light.angle !== undefined && !((light.angle as number) >= 0 && (light.angle as number) < 180)) bad("degrees of angle");
   } else if (light.kind === "environment") {
     if (typeof light.file !== "string") bad("a name of file");
+    if (light.turn !== undefined && !Number.isFinite(light.turn)) bad("degrees of turn");
   } else if (light.kind === "named") {
     if (typeof light.name !== "string") bad("a light's name");
   } else if (light.kind === "area") {

@@ -1,7 +1,7 @@
 /** The controls beside the picture: a chip per light, and folders of settings. */
 import { GUI } from "three/addons/libs/lil-gui.module.min.js";
 import type { Profile, Triple } from "../src";
-import { areaState, type DirectionalState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, type PointLightState, pointState, rounded, shiningOf, sphereState, spotState } from "./light_state";
+import { areaState, type DirectionalState, directionalState, type EnvironmentState, isAimed, isPlaced, type LightState, type PlacedState, type PointLightState, pointState, rounded, shiningOf, sphereState, spotState } from "./light_state";
 import type { AddedKind } from "./asset_lights";
 import type { Box } from "./ball_state";
 import type { Bounds } from "./receivers";
@@ -201,7 +201,7 @@ export class Panel {
       });
     if (light.kind !== "environment") this.temperature(folder, light);
     folder.add(light, "intensity", 0, Math.max(10, 4 * light.intensity), 0.01).name("Intensity").onChange(this.relight);
-    if (light.kind === "environment") folder.add(light, "file").name("File").disable();
+    if (light.kind === "environment") this.environment(folder, light);
     if (isPlaced(light)) this.placed(folder, light);
     if (light.kind === "directional") {
       if (!this.facts.hasDisc) this.turned(folder, light);
@@ -269,6 +269,19 @@ export class Panel {
     };
     folder.add(proxy, "azimuth", -180, 180, 0.1).name("Azimuth (°)").onChange(this.relight);
     folder.add(proxy, "elevation", -89.9, 89.9, 0.1).name("Elevation (°)").onChange(this.relight);
+  }
+
+  private environment(folder: GUI, light: EnvironmentState): void {
+    folder.add(light, "file").name("File").disable();
+    const proxy = {
+      get turn() {
+        return light.turn ?? 0;
+      },
+      set turn(value: number) {
+        light.turn = value || undefined;
+      },
+    };
+    folder.add(proxy, "turn", -180, 180, 0.1).name("Turn (°)").onChange(this.relight);
   }
 
   /** How wide a sun's disc is, which softens its shadows. */

@@ -1,15 +1,19 @@
-/** A light's place along its path: a turn about the vertical, or a swing over the zenith and back. */
+/** A light's place along its path: a turn about the vertical, or a swing over the zenith and back; an environment turns half around and back. */
 import type { Triple } from "../src";
-import { type LightState, rounded } from "./light_state";
+import { type LightState, round, rounded } from "./light_state";
 import type { Bounds } from "./receivers";
 import type { State } from "./state";
+
+/** An angle from -180 to 180 degrees. */
+const around = (degrees: number) => degrees - 360 * Math.round(degrees / 360);
 
 const WIDEST = (75 * Math.PI) / 180; // of a swing, off the zenith
 
 /** `light` after `turns` rounds of `path`; point lights turn about `center`, and swing along x by the scene's `radius`. */
 export function along(light: LightState, path: State["path"], turns: number, center: Triple, radius: number): LightState {
   const angle = 2 * Math.PI * turns;
-  if (path === "none" || path === "frames" || light.kind === "environment" || light.kind === "named") return light;
+  if (path === "none" || path === "frames" || light.kind === "named") return light;
+  if (light.kind === "environment") return { ...light, turn: round(around((light.turn ?? 0) + 360 * (path === "turn" ? turns : 0.5 * Math.sin(angle)))) };
   if (light.kind === "directional") {
     return { ...light, direction: rounded(path === "turn" ? turned(light.direction, angle) : swung(light.direction, angle)) };
   }

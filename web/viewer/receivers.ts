@@ -18,6 +18,11 @@ export class Receivers {
     this.bounds = this.measured();
   }
 
+  /** Whether light is known at the vertices of a mesh alone, rather than between them. */
+  get areVertices(): boolean {
+    return receiverKind(this.asset.manifest) === "vertices";
+  }
+
   covered(texel: number): boolean {
     return this.coverage === undefined || this.coverage.data[this.coverage.channels * texel] >= 0.5;
   }

@@ -40,7 +40,7 @@ function entry(light: LightState, designed: Designed): Record<string, unknown> {
 
 function values(light: LightState, color: Triple): Record<string, unknown> {
   if (light.kind === "directional") return { kind: "directional", direction: light.direction, color, ...(light.angle === undefined ? {} : { angle: (light.angle * Math.PI) / 180 }) };
-  if (light.kind === "environment") return { kind: "environment", file: light.file, color };
+  if (light.kind === "environment") return { kind: "environment", file: light.file, color, ...(light.turn ? { turn: (light.turn * Math.PI) / 180 } : {}) };
   if (light.kind === "named") return { kind: "named", name: light.name, color };
   if (light.kind === "area") {
     const [u, v] = sides(light);

@@ -37,22 +37,34 @@ vec2 place(ivec2 size) {
     return nearest ? (floor(vUv * vec2(size)) + 0.5) / vec2(size) : vUv;
 }
 
-vec3 relitAt() { return textureLod(relit, place(textureSize(relit, 0)), 0.0).rgb; }
-vec3 ambientAt() { return textureLod(ambient, place(textureSize(ambient, 0)), 0.0).rgb; }
+#ifdef AT_VERTICES
+in vec3 vRelit, vAmbient, vNegative, vReference;
+in vec4 vStored;
+#define AT(texels, vertex) vertex
+#else
+#define AT(texels, vertex) textureLod(texels, place(textureSize(texels, 0)), 0.0).rgb
+#endif
+
 float coverageAt() {
-#ifdef DEVELOPED
+#if defined(DEVELOPED) || defined(AT_VERTICES)
     return 1.0;
 #else
     return textureLod(coverage, place(textureSize(coverage, 0)), 0.0).r;
 #endif
 }
-vec3 referenceAt() { return textureLod(reference, place(textureSize(reference, 0)), 0.0).rgb * referenceColor + ambientAt(); }
+
+vec3 relitAt() { return AT(relit, vRelit); }
+vec3 referenceAt() { return AT(reference, vReference) * referenceColor + AT(ambient, vAmbient); }
 
 vec3 valueAt() {
     if (value == ${VALUES.reference} || gl_FragCoord.x < split) return referenceAt();
     if (value == ${VALUES.difference}) return relitAt() - referenceAt();
     if (value == ${VALUES.map}) {
+#ifdef AT_VERTICES
+        vec4 stored = vStored * layerScale + layerBias;
+#else
         vec4 stored = textureLod(layers, vec3(place(textureSize(layers, 0).xy), float(layer)), 0.0) * layerScale + layerBias;
+#endif
         return channel < 0 ? stored.rgb : vec3(stored[channel]);
     }
     return relitAt();
@@ -98,7 +110,7 @@ void main() {
     if (color == ${COLORS.magnitude}) c = turbo(luminance(v) * toneMappingExposure);
     else if (color == ${COLORS.signed}) c = signedColor(luminance(v) * toneMappingExposure);
     else if (color == ${COLORS.negative}) {
-        vec3 below = max(textureLod(negative, place(textureSize(negative, 0)), 0.0).rgb - ambientAt(), 0.0);
+        vec3 below = max(AT(negative, vNegative) - AT(ambient, vAmbient), 0.0);
         float depth = max(below.r, max(below.g, below.b)) * toneMappingExposure;
         vec3 gray = vec3(srgb(vec3(luminance(v) * toneMappingExposure)) * 0.55);
         c = depth > 0.0005 ? mix(vec3(0.35, 0.05, 0.42), vec3(1.0, 0.35, 1.0), clamp(depth * 8.0, 0.0, 1.0)) : gray;
@@ -112,12 +124,29 @@ void main() {
 }`;
 
 const MESH = `precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
 in vec3 position;
 in vec2 lightmapUv;
 uniform mat4 modelViewMatrix, projectionMatrix;
 out vec2 vUv;
+#ifdef AT_VERTICES
+uniform sampler2D relit, ambient, negative, reference;
+uniform sampler2DArray layers;
+uniform int layer;
+out vec3 vRelit, vAmbient, vNegative, vReference;
+out vec4 vStored;
+#endif
 void main() {
     vUv = lightmapUv;
+#ifdef AT_VERTICES
+    vRelit = textureLod(relit, lightmapUv, 0.0).rgb;
+    vAmbient = textureLod(ambient, lightmapUv, 0.0).rgb;
+    vNegative = textureLod(negative, lightmapUv, 0.0).rgb;
+    vReference = textureLod(reference, lightmapUv, 0.0).rgb;
+    vStored = textureLod(layers, vec3(lightmapUv, float(layer)), 0.0);
+#endif
     gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }`;
 
@@ -166,16 +195,20 @@ export function screenUniforms(relit: Texture, textures: SrbfTextures, coverage:
   };
 }
 
-/** Onto a `mesh`, a `picture` of texels, or the whole `screen`, where `relit` is of pixels, row 0 at the bottom. */
-export function screenMaterial(uniforms: ScreenUniforms, onto: "mesh" | "picture" | "screen"): RawShaderMaterial {
+const SHADERS = { mesh: MESH, vertices: MESH, picture: PICTURE, screen: WHOLE };
+const DEFINES = { mesh: {}, vertices: { AT_VERTICES: "" }, picture: {}, screen: { DEVELOPED: "" } };
+
+/** Onto a `mesh`, one that has light at its `vertices` alone, a `picture` of texels, or the whole `screen`, where `relit` is of pixels, row 0 at the bottom. */
+export function screenMaterial(uniforms: ScreenUniforms, onto: keyof typeof SHADERS): RawShaderMaterial {
+  const inScene = onto === "mesh" || onto === "vertices";
   return new RawShaderMaterial({
     glslVersion: GLSL3,
-    defines: onto === "screen" ? { DEVELOPED: "" } : {},
+    defines: { ...DEFINES[onto] },
     uniforms,
-    vertexShader: { mesh: MESH, picture: PICTURE, screen: WHOLE }[onto],
+    vertexShader: SHADERS[onto],
     fragmentShader: FRAGMENT,
-    depthTest: onto === "mesh",
-    depthWrite: onto === "mesh",
+    depthTest: inScene,
+    depthWrite: inScene,
     side: 2,
     toneMapped: false,
   });

@@ -65,7 +65,7 @@ export class Stage {
     const among = model && Surroundings.in(model);
     if (model) this.addModel(model);
     if (model && among && this.lit.length) {
-      this.surroundings = new Surroundings(model, uniforms, quantity, renderer);
+      this.surroundings = new Surroundings(model, uniforms, { quantity, atVertices: receivers.areVertices }, renderer);
       const developer = new Mesh(new PlaneGeometry(2, 2), screenMaterial({ ...uniforms, relit: this.developedFrom }, "screen"));
       developer.frustumCulled = false;
       this.developed.add(developer);
@@ -348,7 +348,7 @@ export class Stage {
 
   /** Meshes with the extension take the relit light; the rest of the file is ignored. */
   private addModel(model: Object3D): void {
-    const material = screenMaterial(this.uniforms, "mesh");
+    const material = screenMaterial(this.uniforms, this.receivers.areVertices ? "vertices" : "mesh");
     model.updateMatrixWorld(true);
     model.traverse((object) => {
       const mesh = object as Mesh<BufferGeometry, Material>;

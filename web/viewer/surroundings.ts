@@ -62,7 +62,7 @@ export class Surroundings {
   constructor(
     model: Object3D,
     uniforms: ScreenUniforms,
-    quantity: "irradiance" | "radiance",
+    light: ReceivedLight,
     private readonly renderer: WebGLRenderer,
   ) {
     this.scene.add(model);
@@ -72,7 +72,7 @@ export class Surroundings {
       const mesh = object as Mesh<BufferGeometry, Material>;
       if (!mesh.isMesh) return;
       if (mesh.geometry.getAttribute("lightmapUv")) {
-        mesh.material = receiverMaterial(mesh, uniforms, quantity);
+        mesh.material = receiverMaterial(mesh, uniforms, light);
         mesh.castShadow = true;
       } else if (isGlass(mesh.material)) mesh.receiveShadow = true;
       else mesh.castShadow = mesh.receiveShadow = true;
@@ -89,7 +89,7 @@ export class Surroundings {
 
   /** A mesh with `lightmapUv` of white surface, whose light `uniforms` hold; it casts shadows. */
   add(mesh: Mesh, uniforms: ScreenUniforms, quantity: "irradiance" | "radiance"): void {
-    mesh.material = receiverMaterial(mesh, uniforms, quantity);
+    mesh.material = receiverMaterial(mesh, uniforms, { quantity });
     mesh.castShadow = true;
     this.scene.add(mesh);
   }
@@ -164,6 +164,7 @@ export class Surroundings {
       this.lit.push(made);
       this.scene.add(made);
     }
+    this.scene.environmentRotation.y = environment?.turn ?? 0;
     this.scene.environment = environment ? this.environmentTexture(environment) : this.daylight;
     this.scene.environmentIntensity = environment ? (environment.color[0] + environment.color[1] + environment.color[2]) / 3 : (FILL * fill) / Math.PI;
     this.renderer.shadowMap.needsUpdate = true;
@@ -253,7 +254,14 @@ void main() {
   return scene;
 }
 
+/** What a receiver's texture holds, and whether it is known at the vertices alone. */
+interface ReceivedLight {
+  quantity: "irradiance" | "radiance";
+  atVertices?: boolean;
+}
+
 const RECEIVER_VERTEX = `precision highp float;
+precision highp sampler2D;
 in vec3 position;
 in vec2 lightmapUv;
 #ifdef COLORED
@@ -267,8 +275,17 @@ out vec2 vSurfaceUv;
 #endif
 out vec2 vUv;
 out vec3 vColor;
+#ifdef AT_VERTICES
+uniform sampler2D relit, reference, ambient;
+out vec3 vRelit, vReference, vAmbient;
+#endif
 void main() {
     vUv = lightmapUv;
+#ifdef AT_VERTICES
+    vRelit = textureLod(relit, lightmapUv, 0.0).rgb;
+    vReference = textureLod(reference, lightmapUv, 0.0).rgb;
+    vAmbient = textureLod(ambient, lightmapUv, 0.0).rgb;
+#endif
     vColor = vec3(1.0);
 #ifdef COLORED
     vColor = color.rgb;
@@ -286,15 +303,19 @@ in vec3 vColor;
 uniform sampler2D relit, reference, ambient;
 uniform vec3 referenceColor, albedo;
 uniform float split;
+#ifdef AT_VERTICES
+in vec3 vRelit, vReference, vAmbient;
+#define AT(texels, vertex) vertex
+#else
+#define AT(texels, vertex) textureLod(texels, vUv, 0.0).rgb
+#endif
 #ifdef TEXTURED
 in vec2 vSurfaceUv;
 uniform sampler2D surface;
 #endif
 out vec4 radiance;
 void main() {
-    vec3 light = gl_FragCoord.x < split
-        ? textureLod(reference, vUv, 0.0).rgb * referenceColor + textureLod(ambient, vUv, 0.0).rgb
-        : textureLod(relit, vUv, 0.0).rgb;
+    vec3 light = gl_FragCoord.x < split ? AT(reference, vReference) * referenceColor + AT(ambient, vAmbient) : AT(relit, vRelit);
 #ifdef IRRADIANCE
     light *= albedo * vColor / 3.14159265358979;
 #ifdef TEXTURED
@@ -305,7 +326,7 @@ void main() {
 }`;
 
 /** The relit lightmap with the albedo of the mesh's own material: irradiance × albedo / π; radiance unchanged. */
-function receiverMaterial(mesh: Mesh, uniforms: ScreenUniforms, quantity: "irradiance" | "radiance"): RawShaderMaterial {
+function receiverMaterial(mesh: Mesh, uniforms: ScreenUniforms, { quantity, atVertices = false }: ReceivedLight): RawShaderMaterial {
   const surface = mesh.userData.surface as MeshStandardMaterial | undefined;
   const { geometry } = mesh;
   const map = surface?.map ?? null;
@@ -320,6 +341,7 @@ function receiverMaterial(mesh: Mesh, uniforms: ScreenUniforms, quantity: "irrad
   }
   const defines: Record<string, string> = {};
   if (quantity === "irradiance") defines.IRRADIANCE = "";
+  if (atVertices) defines.AT_VERTICES = "";
   if (map && uv) defines.TEXTURED = "";
   if (geometry.getAttribute("color")) defines.COLORED = "";
   return new RawShaderMaterial({

@@ -1,12 +1,12 @@
 /** Relighting maps: RGB coefficient maps of spherical Gaussians that share one spread [Wong2005]. */
-import type { DistantLight } from "../asset_frame";
+import { GaussianSums } from "../environment_sums";
 import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
 import { lookup } from "../gaussian";
 import { unit } from "../lights";
 import type { Manifest } from "../manifest";
-import { dot, type Triple } from "../matrix";
+import type { Triple } from "../matrix";
 import shader from "../shaders/relighting_map.glsl";
 import type { N } from "../three/tsl/nodes";
 import type { Fail, Method, Tables } from "./method";
@@ -42,6 +42,7 @@ export const relightingMap: Method = {
     }
     const centers = (manifest.basis?.centers as Triple[]).map(unit);
     const k = centers.length;
+    const sums = new GaussianSums(centers, manifest.basis?.spread as number, manifest.domain, (cosine) => lookup(table.data, cosine));
     return {
       centers,
       maps: k,
@@ -50,22 +51,16 @@ export const relightingMap: Method = {
       integers: {},
       textures: { srbfTable: table },
       weights: { kind: "uniform", width: k, height: 1 },
-      projectedWeights: ({ distant }) => projectedWeights(centers, table.data, distant),
+      projectedWeights({ distant, environments, assetFromWorld }) {
+        const projected = new Float64Array(3 * k);
+        sums.addDistant(distant, projected);
+        for (const light of environments) sums.addEnvironment(light, assetFromWorld, projected);
+        return projected;
+      },
       sum: (kit, uv, receiver) => sum(kit, table.width, uv, receiver),
     };
   },
 };
-
-function projectedWeights(centers: readonly Triple[], table: Float32Array, lights: Iterable<DistantLight>): Float64Array {
-  const projected = new Float64Array(3 * centers.length);
-  for (const [direction, color] of lights) {
-    for (let k = 0; k < centers.length; ++k) {
-      const weight = lookup(table, dot(direction, centers[k]));
-      for (let c = 0; c < 3; ++c) projected[3 * k + c] += weight * color[c];
-    }
-  }
-  return projected;
-}
 
 function sum(kit: NodeKit, tableSize: number, uv: N, receiver: N): N {
   const { versine, weight } = kit.pack;

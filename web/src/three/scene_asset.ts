@@ -3,7 +3,7 @@ import { type Light as ThreeLight, Matrix4, type Texture } from "three";
 import type { Asset } from "../asset";
 import { inAssetFrame } from "../asset_frame";
 import { SrbfError } from "../errors";
-import { type Light, moved, namedLight } from "../lights";
+import { type EnvironmentLight, type Light, moved, namedLight } from "../lights";
 import { asDesigned, put, setNamedLight } from "../named_lights";
 import { multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues } from "../shader";
@@ -22,6 +22,7 @@ export class SceneAsset {
   /** Blender's z-up world from three's y-up one; compose it with the inverse of a group that moves the asset's objects. */
   readonly worldFromScene: Matrix4;
   private readonly followed: Set<SceneLight>;
+  private environment?: { map: Texture; version: number; light: EnvironmentLight };
 
   /** `lightsOf`: the asset that has the lights and the place in the scene of this one. */
   constructor(
@@ -64,15 +65,21 @@ export class SceneAsset {
   }
 
   /**
-   * Let an equirectangular map of three's shine from all around, `scene.environment` say, by its radiance times `intensity`; none ends it. Bounces alone
-   * of an indirect asset: three adds what comes straight from the map.
+   * Let an equirectangular map of three's shine from all around, `scene.environment` say, by its radiance times `intensity`, turned by `turn` as
+   * `scene.environmentRotation.y` turns it (rad); none ends it. Bounces alone of an indirect asset: three adds what comes straight from the map.
    *
    * @throws SrbfError on other textures; `update` does on assets that know no environment.
    */
-  setEnvironment(map?: Texture | null, intensity = 1): this {
+  setEnvironment(map?: Texture | null, intensity = 1, turn = 0): this {
     const others = this.lights.filter((light) => light.kind !== "environment");
-    this.lights.splice(0, this.lights.length, ...others, ...(map ? [environmentOf(map, intensity)] : []));
+    this.lights.splice(0, this.lights.length, ...others, ...(map ? [{ ...this.environmentLight(map), color: [intensity, intensity, intensity] as const, turn }] : []));
     return this;
+  }
+
+  /** A map that is set again and again, to turn it, is read once. */
+  private environmentLight(map: Texture): EnvironmentLight {
+    if (this.environment?.map !== map || this.environment.version !== map.version) this.environment = { map, version: map.version, light: environmentOf(map) };
+    return this.environment.light;
   }
 
   /** Read three.js lights at every `update`. @throws SrbfError on kinds other than directional, point, spot and area. */

@@ -32,7 +32,7 @@ export function lightOfJson(json: LightJson): Light {
   if (json.kind === "sphere") return sphereLight(json.position as Triple, json.size as number, options);
   if (json.kind === "area") return areaLight(json.position as Triple, json.u as Triple, json.v as Triple, { color: json.color, a0: json.a0 as number });
   if (json.kind === "named") return namedLight(json.name as string, json.color);
-  return environmentLight(json.width as number, json.height as number, json.pixels as number[], json.color);
+  return environmentLight(json.width as number, json.height as number, json.pixels as number[], json.color, json.turn as number | undefined);
 }
 
 /** A table row by row, RGB, as `srbf.light_profile.Profile` has it. */
