@@ -56,8 +56,8 @@ class Asset:
     scale, bias
         (N, C) float32.
     tables
-        What the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32, `w_table` (rows,
-        columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
+        What the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32 or float16,
+        `w_table` (rows, columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
     images
         position (m), normal, albedo (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional; of views with gloss `glossy`
         (H, W, 3), what lobes reflect toward the camera, and `lobe` (H, W, 3), of translucent views `transmission` (H, W, 3), see
@@ -177,7 +177,8 @@ class Asset:
         (1, 5, 3)
         """
         basis = self.manifest["light_basis"]
-        return LightFunctions(np.array(basis["centers"], np.float64), np.array(basis["spreads"]), self.tables["light_coefficients"])
+        coefficients = self.tables["light_coefficients"].astype(np.float32, copy=False)
+        return LightFunctions(np.array(basis["centers"], np.float64), np.array(basis["spreads"]), coefficients)
 
     @property
     def domain(self) -> Domain:

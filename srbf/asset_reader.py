@@ -14,7 +14,7 @@ from srbf.errors import ImageError, ManifestError
 from srbf.io import files
 from srbf.io.containers import read_texture_array
 from srbf.io.containers.texture_array import TextureArray
-from srbf.io.image import read_image, require_finite
+from srbf.io.image import read_image, read_stored, require_finite
 from srbf.io.packed_table import unpack
 
 ASSET_MANIFEST = "asset.json"
@@ -48,11 +48,17 @@ class AssetReader:
 
     def table(self, name: str, shape: tuple[int, int], channels: int) -> np.ndarray:
         """A table of the manifest's key `name`, (rows, columns, channels) float32."""
+        return self.stored_table(name, shape, channels).astype(np.float32, copy=False)
+
+    def stored_table(self, name: str, shape: tuple[int, int], channels: int) -> np.ndarray:
+        """`table` without widening: float16 where the file has half floats."""
         file = self.manifest[name]["file"]
-        pixels = self.pixels(file, channels)
+        path = self._checked(file)
+        pixels = read_stored(path, channels)
+        require_finite(pixels, path)
         if pixels.shape[:2] != shape:
             found = f"{pixels.shape[1]}x{pixels.shape[0]}"
-            raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
+            raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {path}, found {found}")
         return pixels
 
     def half_table(self, name: str, shape: tuple[int, int], channels: int) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from closed_forms import ball
 
+from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.cubemap import Cubemap
 from srbf.cubemap_capture import CubemapCapture
@@ -146,7 +147,7 @@ def test_radiance_is_irradiance_times_albedo_over_pi(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_fit_within_a_budget_keeps_to_it_and_relights(capture: Capture) -> None:
+def test_a_fit_within_a_budget_keeps_to_it_and_relights(capture: Capture, tmp_path: Path) -> None:
     said: list[str] = []
     asset = fit(capture, budget=16, say=said.append)
     assert asset.method == "clustered-eigen-map" and asset.bytes_per_texel()["directional"] <= 16 and "chose" in said[0]
@@ -157,6 +158,9 @@ def test_a_fit_within_a_budget_keeps_to_it_and_relights(capture: Capture) -> Non
     relit, true = linear_response(asset, [DirectionalLight((x, y, z))]), capture.image(index)
     covered = capture.coverage() > 0
     assert np.linalg.norm((relit - true)[covered]) < 0.2 * np.linalg.norm(true[covered])
+    assert asset.tables["light_coefficients"].dtype == np.float16
+    asset.save(tmp_path / "asset")
+    np.testing.assert_array_equal(linear_response(Asset.open(tmp_path / "asset"), [DirectionalLight((x, y, z))]), relit)
 
 
 def test_without_bounces_there_is_direct_light_alone(tmp_path: Path) -> None:

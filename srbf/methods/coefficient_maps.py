@@ -12,7 +12,7 @@ from typing import Any, ClassVar, get_args
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64
+from srbf.arrays import Float, Float32, Float64
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.basis.light_functions import LightFunctions
@@ -50,7 +50,7 @@ class CoefficientMaps(ComponentMaps):
             raise ManifestError(f"expected a spread for each of {functions} light functions in {path}, found {len(basis['spreads'])}")
         size, columns = manifest["w_table"]["size"], manifest["w_table"]["columns"]
         return {
-            "light_coefficients": reader.table("light_coefficients", (functions, len(basis["centers"])), 3),
+            "light_coefficients": reader.stored_table("light_coefficients", (functions, len(basis["centers"])), 3),
             "w_table": reader.table("w_table", (-(-functions // columns) * size, columns * size), 3).astype(np.float16),
         }
 
@@ -139,8 +139,15 @@ def coefficient_maps_asset(
         "mapping": "octahedral",
         "error": table.error,
     }
-    tables = {"light_coefficients": functions.coefficients, "w_table": table.atlas, **own.tables()}
+    tables = {"light_coefficients": _narrowest(functions.coefficients), "w_table": table.atlas, **own.tables()}
     asset = Asset(manifest, own.stored, own.scale, own.bias, tables, images, carried_scene(capture))
     if stitch is not None and own.unstitched is not None:
         manifest["seams"] = seam_report(asset, capture, stitch, own.unstitched, method.captured_responses, own.unstitched_index)
     return asset
+
+
+def _narrowest(coefficients: Float32[ndarray, "F B 3"]) -> Float[ndarray, "F B 3"]:
+    """As half floats, where these are the same numbers."""
+    with np.errstate(over="ignore"):
+        half = coefficients.astype(np.float16)
+    return half if np.array_equal(half, coefficients) else coefficients
