@@ -3,7 +3,7 @@
 Weights by passes of the GPU (shadow maps of 128, 256, 512 and 1024 texels per side of a face), by those of WebGPU's nodes, by compute
 shaders, by rays on the CPU, and by the table of places (rays for spots and areas): relative RMSE of the indirect light over all texels,
 at random free places. Deep framebuffers have no table. The page is that of the browser's tests:
-`npm run build:pages -- --outDir ../build/web/pages` in web/. Chromium is found on PATH, and runs SwiftShader.
+`npm run build:pages -- --outDir ../../../build/web/pages` in web/. Chromium is found on PATH, and runs SwiftShader.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -57,15 +59,40 @@ def light_sets(asset: Asset, count: int, seed: int) -> dict[str, list[list[Light
 def drawn(page: subprocess.Popen[str], url: str, sets: list[list[Light]], options: dict[str, Any]) -> list[np.ndarray] | None:
     """The lightmaps, (H, W, 3) each; None where the asset cannot be relit so."""
     lights = [[{"kind": KINDS[type(light)], **asdict(light)} for light in one] for one in sets]
+    said = asked(page, {"run": "three-lightmap", "asset": url, "lights": [], "lightSets": lights, **options})
+    return None if "error" in said else images(said)
+
+
+def asked(page: subprocess.Popen[str], job: dict[str, Any]) -> dict[str, Any]:
+    """What the page says of a job."""
     assert page.stdin is not None
     assert page.stdout is not None
-    page.stdin.write(json.dumps({"run": "three-lightmap", "asset": url, "lights": [], "lightSets": lights, **options}) + "\n")
+    page.stdin.write(json.dumps(job) + "\n")
     page.stdin.flush()
-    said = json.loads(page.stdout.readline())
-    if "error" in said:
-        return None
-    images = [np.frombuffer(base64.b64decode(one["pixels"]), np.float32) for one in said["pictures"]]
-    return [image.reshape(one["height"], one["width"], 4)[..., :3] for image, one in zip(images, said["pictures"], strict=True)]
+    said: dict[str, Any] = json.loads(page.stdout.readline())
+    return said
+
+
+def images(said: dict[str, Any]) -> list[np.ndarray]:
+    """The lightmaps of a job, (H, W, 3) each."""
+    shapes = [(one["height"], one["width"], 4) for one in said["pictures"]]
+    flat = [np.frombuffer(base64.b64decode(one["pixels"]), np.float32) for one in said["pictures"]]
+    return [pixels.reshape(shape)[..., :3] for pixels, shape in zip(flat, shapes, strict=True)]
+
+
+@contextmanager
+def open_page(folder: str) -> Iterator[subprocess.Popen[str]]:
+    """The tests' page in Chromium, which serves what is in `folder` as /served/."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    node, chromium = shutil.which("node", path=path), shutil.which("chromium") or shutil.which("google-chrome")
+    assert node, "expected node, found none; pip install 'srbf[test]'"
+    assert chromium, "expected Chromium on PATH, found none"
+    command = [node, str(ROOT / "web/test/driver.mjs"), chromium, str(ROOT / "build/web/pages"), folder]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as page:
+        assert page.stdout is not None
+        page.stdout.readline()
+        yield page
+        page.terminate()
 
 
 def main() -> None:
@@ -74,15 +101,7 @@ def main() -> None:
     parser.add_argument("--lights", type=int, default=8)
     parser.add_argument("--seed", type=int, default=3)
     arguments = parser.parse_args()
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    node, chromium = shutil.which("node", path=path), shutil.which("chromium") or shutil.which("google-chrome")
-    assert node, "expected node, found none; pip install 'srbf[test]'"
-    assert chromium, "expected Chromium on PATH, found none"
-    with tempfile.TemporaryDirectory() as folder:
-        command = [node, str(ROOT / "web/test/driver.mjs"), chromium, str(ROOT / "build/web/pages"), folder]
-        page = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        assert page.stdout is not None
-        page.stdout.readline()
+    with tempfile.TemporaryDirectory() as folder, open_page(folder) as page:
         for place in arguments.assets:
             asset = Asset.open(place)
             (Path(folder) / place.name).symlink_to(place.resolve())
@@ -98,7 +117,6 @@ def main() -> None:
                         for image, own in zip(found, expected, strict=True)
                     ]
                     print(f"{place.name}, {kind}, {name}: median {np.median(errors):.4f}, worst {max(errors):.4f}", flush=True)
-        page.terminate()
 
 
 if __name__ == "__main__":

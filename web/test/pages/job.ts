@@ -1,5 +1,5 @@
 /** Jobs that the tests send to a page, and their results. */
-import { areaLight, directionalLight, environmentLight, type Light, namedLight, pointLight, Profile, sphereLight, spotLight, type Triple } from "../../src";
+import { areaLight, directionalLight, type EnvironmentLight, environmentLight, type Light, namedLight, pointLight, Profile, sphereLight, spotLight, type Triple } from "../../src";
 
 export interface Job {
   run: string;
@@ -21,6 +21,8 @@ export interface Picture {
   pixels: string;
 }
 
+let lastMap: EnvironmentLight | undefined; // what an environment without pixels turns
+
 export function lightOfJson(json: LightJson): Light {
   const shape = json.profile ? { profile: profileOf(json.profile as ProfileJson), direction: json.direction as Triple, roll: json.roll as number } : {};
   const options = { color: json.color, a0: json.a0 as number, falloff: json.falloff as "linear", radius: json.radius as number, ...shape };
@@ -32,7 +34,8 @@ export function lightOfJson(json: LightJson): Light {
   if (json.kind === "sphere") return sphereLight(json.position as Triple, json.size as number, options);
   if (json.kind === "area") return areaLight(json.position as Triple, json.u as Triple, json.v as Triple, { color: json.color, a0: json.a0 as number });
   if (json.kind === "named") return namedLight(json.name as string, json.color);
-  return environmentLight(json.width as number, json.height as number, json.pixels as number[], json.color, json.turn as number | undefined);
+  if (json.pixels) lastMap = environmentLight(json.width as number, json.height as number, json.pixels as number[]);
+  return { ...(lastMap as EnvironmentLight), color: json.color, turn: json.turn as number | undefined };
 }
 
 /** A table row by row, RGB, as `srbf.light_profile.Profile` has it. */

@@ -23,14 +23,18 @@ export async function threeLightmap(job: Job) {
   const { width, height } = map.asset.manifest;
   const { pass, gpu } = map as unknown as { pass: { target: THREE.WebGLRenderTarget }; gpu?: { computed?: number } };
   const { target } = pass;
+  const milliseconds: number[] = []; // of each, until it can be read
   const pictures = job.lightSets.map((lights, i) => {
     map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
     change(job, map, i);
+    const start = performance.now();
     map.update(shared());
-    return picture(width, height, read(target, width, height));
+    const pixels = read(target, width, height);
+    milliseconds.push(performance.now() - start);
+    return picture(width, height, pixels);
   });
   map.dispose();
-  return { pictures, computed: gpu?.computed };
+  return { pictures, milliseconds, computed: gpu?.computed };
 }
 
 /**
