@@ -11,7 +11,10 @@ import { type EnvironmentDirections, environmentDirections } from "./environment
 export type DistantLight = readonly [direction: Triple, color: Triple];
 
 export interface LightsInAssetFrame {
-  /** Directional lights and, of assets of directions, the texels of environments, made as they are asked for, once. */
+  readonly suns: readonly DistantLight[];
+  /** Of assets of directions, the texels of environments, made as they are asked for, once. */
+  readonly texels: Iterable<DistantLight>;
+  /** Both. */
   readonly distant: Iterable<DistantLight>;
   /** Environments around lights inside a scene, in the asset's world. */
   readonly environments: readonly EnvironmentLight[];
@@ -43,13 +46,18 @@ export function inAssetFrame(asset: Pick<Asset, "manifest" | "assetFromWorld">, 
   if (domain === "directions" && lights.some((light) => isPunctual(light) && light.profile)) {
     throw new SrbfError("expected lights without a profile for this asset, found one; capture the scene with --light-set surfels or gather");
   }
+  const suns = lights.filter((light) => light.kind === "directional").map((light): DistantLight => [moved(light, assetFromWorld).direction, light.color]);
+  function* environmentTexels(): Generator<DistantLight> {
+    for (const light of lights) if (light.kind === "environment" && domain === "directions") yield* environmentSamples(light, manifest.domain, assetFromWorld);
+  }
+  const texels = environmentTexels();
   function* distant(): Generator<DistantLight> {
-    for (const light of lights) {
-      if (light.kind === "directional") yield [moved(light, assetFromWorld).direction, light.color];
-      if (light.kind === "environment" && domain === "directions") yield* environmentSamples(light, manifest.domain, assetFromWorld);
-    }
+    yield* suns;
+    yield* texels;
   }
   return {
+    suns,
+    texels,
     distant: distant(),
     environments: domain === "directions" || domain === "pool" ? [] : lights.filter((light) => light.kind === "environment"),
     environmentDirections: domain === "pool" ? lights.filter((light) => light.kind === "environment").map((light) => environmentDirections(light, assetFromWorld)) : [],
