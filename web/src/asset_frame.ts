@@ -11,6 +11,7 @@ import { type EnvironmentDirections, environmentDirections } from "./environment
 export type DistantLight = readonly [direction: Triple, color: Triple];
 
 export interface LightsInAssetFrame {
+  /** Directional lights. */
   readonly suns: readonly DistantLight[];
   /** Of assets of directions, the texels of environments, made as they are asked for, once. */
   readonly texels: Iterable<DistantLight>;
