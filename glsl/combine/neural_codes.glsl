@@ -2,8 +2,9 @@
 /* srbfNeuralCodes: what the code of each texel adds to the first hidden layer of a neural decoder, the same for all lights.
    use:    void srbfNeuralCodes(sampler2DArray planes, vec2 uv, float level, vec4 network[SRBF_NETWORK], vec4 scale[SRBF_LAYERS],
                                 vec4 bias[SRBF_LAYERS], out vec4 units[SRBF_UNIT_VECTORS])
-   domain: planes four numbers of the code per layer, which may be filtered linearly; level: mip level, 0 without mip maps; network the
-           rows of network.exr, SRBF_UNIT_VECTORS vec4 per row, and of the last row the first; scale, bias of the layers, from asset.json, 0 in channels past the last number
+   domain: planes four numbers of the code per layer, nearest, since the light of a mean of codes is no mean of light; level: mip level,
+           0 without mip maps; network the rows of network.exr, SRBF_UNIT_VECTORS vec4 per row, and of the last row the first; scale, bias
+           of the layers, from asset.json, 0 in channels past the last number
    twin:   srbf.basis.neural_decoder.NeuralDecoder.of_codes
    cite:   Dulecha2020 */
 #include "combine/decode_components.glsl"

@@ -80,7 +80,6 @@ class NeuralMap(Method):
     tables: ClassVar[dict[str, str]] = {"network": "network.exr"}
     implied_by: ClassVar[tuple[str, ...]] = ("codes",)
     exportable: ClassVar[bool] = False
-    on_page: ClassVar[bool] = False
 
     codes: int = setting(12, "How many numbers per texel.")
     hidden: int = setting(20, "Units in each hidden layer of the network.")

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_assets import build_neural
 from typer.testing import CliRunner
 from web_assets import complete, on_a_plane
 
@@ -75,13 +76,18 @@ def test_a_directional_light_dragged_over_the_disc_relights(chromium: Any, asset
     assert shows(chromium, asset, [DirectionalLight(tuple(light))])
 
 
-@pytest.mark.parametrize("kind", ["relighting-map", "eigen-map", "clustered-eigen-map"])
+@pytest.mark.parametrize("kind", ["relighting-map", "eigen-map", "clustered-eigen-map", "neural-map"])
 def test_point_lights_and_suns_together_are_numpys(
     chromium: Any, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset], serve: Callable[..., str], tmp_path: Path, kind: str
 ) -> None:
     """Typed into the panel; each light's color and falloff its own."""
-    made = make_asset(k=6) if kind == "relighting-map" else make_planes(components=5, clusters=4 if kind.startswith("c") else None)
-    asset = complete(on_a_plane(made))
+    made = {
+        "relighting-map": lambda: make_asset(k=6),
+        "eigen-map": lambda: make_planes(components=5),
+        "clustered-eigen-map": lambda: make_planes(components=5, clusters=4),
+        "neural-map": build_neural,
+    }
+    asset = complete(on_a_plane(made[kind]()))
     asset.save(tmp_path / "asset")
     chromium("open", url=serve(tmp_path / "asset") + PICTURE + ",'exposure':-1}", width=WIDTH, height=HEIGHT)
     chromium("number", name="Intensity", value=0.4)

@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_assets import build_neural
 from web_assets import LIGHTS, complete
 
 from srbf.asset import Asset
 from srbf.export import Settings, export
 from srbf.gl.uniforms import point_light_uniforms
-from srbf.lights import PointLight, moved
+from srbf.light_domain.distant_lights import distant_lights
+from srbf.lights import DirectionalLight, PointLight, moved
 from srbf.methods import projected_weights
 
 DOUBLE = 1e-11  # relative: the same double-precision arithmetic in another order
@@ -52,6 +54,21 @@ def test_weights_and_point_lights_are_numpys(browser: Any, make_asset: Callable,
             np.testing.assert_allclose(place[0], place[1], rtol=1e-10)
             for name in point_light.keys() - {"position", "positionLow"}:
                 np.testing.assert_allclose(found[name], point_light[name], rtol=1e-12, atol=1e-15, err_msg=f"{kind} {name}")
+
+
+@pytest.mark.parametrize("domain", ["sphere", "hemisphere"])
+def test_a_neural_map_has_numpys_lights_at_infinity(browser: Any, domain: str) -> None:
+    asset = complete(build_neural(), domain=domain)
+    url = browser.serve(asset)
+    for kind in ("environment", "several"):
+        directions, colors = np.reshape(browser.response("host", asset=url, lights=LIGHTS[kind])["weights"], (2, -1, 3))
+        expected = distant_lights(asset.manifest, LIGHTS[kind])
+        count = len(expected[0])
+        assert count > 20 and not directions[count:].any() and not colors[count:].any()
+        np.testing.assert_allclose(directions[:count], expected[0], rtol=DOUBLE, atol=DOUBLE)
+        np.testing.assert_allclose(colors[:count], expected[1], rtol=DOUBLE, atol=DOUBLE)
+    said = browser.response("host", asset=url, lights=[DirectionalLight((0, 0, 1))] * 513)["error"]
+    assert "expected at most 512 lights at infinity for a neural map, environments as 256, found 513" in said
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)

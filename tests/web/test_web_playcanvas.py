@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_assets import build_neural
 from web_assets import FLOAT, HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
 
 from srbf.asset import Asset
@@ -34,10 +35,15 @@ def test_eigen_maps_and_radiance_work_too(browser: Any, make_planes: Callable[..
 
 
 @pytest.mark.parametrize("filtering", ["nearest", "linear"])
-@pytest.mark.parametrize("kind", ["directional", "several"])
-def test_clusters_are_rebuilt_texel_by_texel(browser: Any, make_planes: Callable[..., Asset], kind: str, filtering: str) -> None:
-    """Each texel by its own cluster's functions; filtered, the light of four texels is mixed, which in a texel's middle is its own."""
-    asset = complete(on_a_plane(make_planes(components=5, clusters=7, encoding="half", ambient=True)))
+@pytest.mark.parametrize(
+    ("method", "kind"), [("clustered-eigen-map", "directional"), ("clustered-eigen-map", "several"), ("neural-map", "several")]
+)
+def test_layers_without_a_mean_are_relit_texel_by_texel(
+    browser: Any, make_planes: Callable[..., Asset], method: str, kind: str, filtering: str
+) -> None:
+    """Each texel by its own functions or code; filtered, the light of four texels is mixed, which in a texel's middle is its own."""
+    made = build_neural() if method == "neural-map" else make_planes(components=5, clusters=7, encoding="half", ambient=True)
+    asset = complete(on_a_plane(made))
     job = {"asset": browser.serve(asset), "lights": LIGHTS[kind], "color": ALBEDO, "half": HALF_EXTENT, "filter": filtering}
     shown = browser.picture("playcanvas-material", **job) * np.pi / ALBEDO
     allowed = tolerance(asset, LIGHTS[kind])

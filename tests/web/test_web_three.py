@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_assets import build_neural
 from web_assets import FOLLOWED, HALF_EXTENT, LIGHTS, complete, decoded, on_a_plane, tolerance
 
 from srbf.asset import Asset
@@ -16,6 +17,7 @@ from srbf.io.containers import read_texture_array
 from srbf.methods import linear_response, relight
 
 ENCODINGS = ("float", "half", "uint8")
+METHODS = ("relighting-map", "eigen-map", "clustered-eigen-map", "neural-map")
 ALBEDO = (0.8, 0.5, 0.3)
 MATERIALS = ("MeshStandardMaterial", "MeshLambertMaterial", "MeshBasicMaterial")
 
@@ -29,6 +31,7 @@ def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable
             make_asset(k=7, encoding=encoding, ambient=True),
             make_planes(components=9, encoding=encoding, ambient=True),
             make_planes(components=5, clusters=7, encoding=encoding),
+            build_neural(encoding=encoding),
         ):
             ready = complete(on_a_plane(asset))
             out[ready.method, encoding] = ready, browser.serve(ready)
@@ -36,7 +39,7 @@ def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-@pytest.mark.parametrize("method", ["relighting-map", "eigen-map", "clustered-eigen-map"])
+@pytest.mark.parametrize("method", METHODS)
 def test_the_lightmap_that_three_draws_is_numpys(browser: Any, served: dict, method: str, encoding: str) -> None:
     asset, url = served[method, encoding]
     kinds = list(LIGHTS) if encoding == "half" else ["several"]
@@ -48,7 +51,7 @@ def test_the_lightmap_that_three_draws_is_numpys(browser: Any, served: dict, met
 
 
 @pytest.mark.parametrize("source", ["maps", "lightmap"])
-@pytest.mark.parametrize("method", ["relighting-map", "eigen-map", "clustered-eigen-map"])
+@pytest.mark.parametrize("method", METHODS)
 def test_a_lambert_material_shows_albedo_times_irradiance_over_pi(browser: Any, served: dict, method: str, source: str) -> None:
     """Texel for texel, receivers from the vertex stage, the mesh's uv1 with v downwards."""
     asset, url = served[method, "half"]
@@ -60,7 +63,7 @@ def test_a_lambert_material_shows_albedo_times_irradiance_over_pi(browser: Any, 
         "half": HALF_EXTENT,
         "source": source,
     }
-    if (method, source) == ("clustered-eigen-map", "maps"):
+    if source == "maps" and method in ("clustered-eigen-map", "neural-map"):
         assert 'expected source "lightmap"' in browser.response("three-material", **job)["error"]
         return
     shown = browser.picture("three-material", **job)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_assets import build_neural
 from web_assets import FOLLOWED, HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
 
 from srbf.asset import Asset
@@ -14,7 +15,7 @@ from srbf.export import export
 from srbf.methods import relight
 
 BACKENDS = ("webgl", "webgpu")
-METHODS = ("relighting-map", "eigen-map", "clustered-eigen-map")
+METHODS = ("relighting-map", "eigen-map", "clustered-eigen-map", "neural-map")
 ALBEDO = (0.8, 0.5, 0.3)
 
 
@@ -25,6 +26,7 @@ def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable
         make_asset(k=7, encoding="half", ambient=True),
         make_planes(components=9, encoding="uint8"),
         make_planes(components=5, clusters=7),
+        build_neural(),
     ]
     ready = [complete(on_a_plane(asset)) for asset in made]
     return {asset.method: (asset, browser.serve(asset)) for asset in ready}

@@ -75,7 +75,7 @@ def complete(asset: Asset, **manifest: Any) -> Asset:
     keys[asset.layers_key] = layer_entries("map" if relighting else "plane", asset.encoding, asset.scale, asset.bias)
     if relighting:
         keys["r_table"] = {"file": "r_table.exr", "size": len(asset.table)}
-    else:
+    elif own["method"] != "neural-map":
         keys["light_coefficients"] = {"file": "light_coefficients.exr"}
         keys["w_table"] = {**own["w_table"], "file": "w_table.exr", "mapping": "octahedral"}
         if "cluster_index" in asset.tables:
@@ -84,7 +84,10 @@ def complete(asset: Asset, **manifest: Any) -> Asset:
 
 
 def tolerance(asset: Asset, lights: Sequence[Light], target: str = "float") -> np.ndarray:
-    """How far a picture may be from numpy's, (H, W, 3): relative to the sum of the magnitudes of all terms of all lights."""
+    """How far a picture may be from numpy's, (H, W, 3): relative to the sum of the magnitudes of all terms of all lights.
+
+    Of a neural map: to the largest response to each light, since its terms have no fixed number.
+    """
     values = asset.coefficients()
     bare = replace(
         asset,
@@ -94,6 +97,9 @@ def tolerance(asset: Asset, lights: Sequence[Light], target: str = "float") -> n
     )
     bound = np.zeros((asset.height, asset.width, 3), np.float32)
     for light in lights:
+        if asset.method == "neural-map":
+            bound += np.abs(methods.linear_response(asset, [light])).max()
+            continue
         nothing = methods.linear_response(replace(bare, stored=np.zeros_like(values)), [light])
         bound += np.abs(nothing)
         for layer in range(len(values)):

@@ -104,6 +104,7 @@ describe("manifests", () => {
     [{ receiver: { kind: "room" } }, "expected a receiver of lightmap, view, vertices"],
     [{ width: 0 }, "expected width of at least 1"],
     [{ method: "eigen-map", scalars: 5, planes: [{ file: "p", encoding: "half", scale: [1, 1, 1, 1], bias: [0, 0, 0, 0] }] }, "scalars four to an image"],
+    [{ method: "neural-map", scalars: 4, planes: [{ file: "p", encoding: "half", scale: [1, 1, 1, 1], bias: [0, 0, 0, 0] }], network: { hidden: 6 } }, "a network of a multiple of 4 hidden units"],
   ])("refuses %j", (change, message) => {
     expect(() => checkManifest({ ...MANIFEST, ...change }, "asset.json")).toThrow(message);
   });

@@ -75,7 +75,7 @@ export interface Tables {
   readonly environment?: EnvironmentTable;
   /** Objects that emit or are repainted, of assets fitted with `--editable`. */
   readonly surfaces?: Surfaces;
-  /** Sum over lights of color times light function: RGB for each function, (F, 3), F = width * height of `weights`. */
+  /** Sum over lights of color times light function: RGB for each function, (F, 3), F = width * height of `weights`; or what else the shader takes as such. */
   projectedWeights(lights: LightsInAssetFrame): Float64Array;
   /** `srbfSum` in three.js' node language: the light of all lights at `uv` (v downwards), before the clamp; `receiver` in the asset's frame, meters. */
   sum(kit: NodeKit, uv: N, receiver: N): N;

@@ -18,7 +18,7 @@ import { assetUniforms, setFrame, type Uniforms } from "./uniforms";
 export interface RelightingMapOptions extends TargetOptions {
   /**
    * `maps`: materials sum the layers at every pixel. `lightmap`: `update` draws a lightmap whenever a light changes, and materials sample it, with mip
-   * maps if asked for; the only choice for clustered eigen maps.
+   * maps if asked for; the only choice for layers that must not be filtered, of clusters and neural maps.
    */
   source?: "maps" | "lightmap";
   /**
@@ -180,7 +180,7 @@ export class SrbfRelightingMap extends SceneAsset {
     if (needed > most) {
       throw new SrbfError(
         `expected at most ${most} vectors of uniforms on this GPU, found ${needed} for ${this.asset.layers.count} layers and ${room} point lights; ` +
-          (this.pass ? "fit with fewer layers, or follow fewer point lights" : 'take source: "lightmap", or an eigen map'),
+          (this.pass ? "fit with fewer layers or hidden units, or follow fewer point lights" : 'take source: "lightmap", or an eigen map'),
       );
     }
   }

@@ -18,7 +18,7 @@ let engine: Engine | undefined;
 
 /** A quad of the receivers' plane under an orthographic camera, one pixel per texel. */
 export async function babylonMaterial(job: Job) {
-  engine ??= new Engine(document.createElement("canvas"), false);
+  engine ??= new Engine(Object.assign(document.createElement("canvas"), { width: 1, height: 1 }), false); // drawn to, and not looked at
   const scene = new Scene(engine);
   scene.useRightHandedSystem = job.rightHanded === true;
   scene.imageProcessingConfiguration.applyByPostProcess = true; // linear values in the target
@@ -61,7 +61,7 @@ function quad(job: Job, scene: Scene): Mesh {
   const data = new VertexData();
   data.positions = [-a * s, z, -b, a * s, z, -b, -a * s, z, b, a * s, z, b];
   data.normals = [0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0];
-  data.uvs2 = [0, 0, 1, 0, 0, 1, 1, 1];
+  data.uvs2 = (job.uvs as number[]) ?? [0, 0, 1, 0, 0, 1, 1, 1];
   data.indices = [0, 2, 1, 1, 2, 3];
   data.applyToMesh(mesh);
   return mesh;
