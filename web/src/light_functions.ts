@@ -4,6 +4,7 @@ import { GaussianSums } from "./environment_sums";
 import type { Triple } from "./matrix";
 
 const FAINT = 1e-9; // of the largest number
+const MANY = 8; // of so many, from which on all are added
 
 /** F functions over B shared unit centers, each with its own spread (rad); `coefficients` is (F, B, 3), row by row. */
 export class LightFunctions {
@@ -34,15 +35,30 @@ export class LightFunctions {
     this.which.forEach((spread, f) => {
       const { own, places } = summed[spread];
       const coefficients = this.coefficients.subarray(f * numbers, (f + 1) * numbers);
-      let [r, g, b] = [0, 0, 0];
-      for (const i of places) {
-        r += coefficients[i] * own[i];
-        g += coefficients[i + 1] * own[i + 1];
-        b += coefficients[i + 2] * own[i + 2];
-      }
-      projected.set([r, g, b], 3 * f);
+      if (3 * MANY * places.length < numbers) addFew(coefficients, own, places, projected, 3 * f);
+      else addAll(coefficients, own, projected, 3 * f);
     });
     return projected;
+  }
+}
+
+/** Add the products of RGB numbers to those at `at`; a loop without indices takes a fifth of the time of `addFew`. */
+function addAll(left: Float32Array, right: Float64Array, to: Float64Array, at: number): void {
+  let [r, g, b] = [0, 0, 0];
+  for (let i = 0; i < left.length; i += 3) {
+    r += left[i] * right[i];
+    g += left[i + 1] * right[i + 1];
+    b += left[i + 2] * right[i + 2];
+  }
+  to[at] += r;
+  to[at + 1] += g;
+  to[at + 2] += b;
+}
+
+/** The same at some `places`. */
+function addFew(left: Float32Array, right: Float64Array, places: Int32Array, to: Float64Array, at: number): void {
+  for (let k = 0; k < places.length; ++k) {
+    for (let c = 0; c < 3; ++c) to[at + c] += left[places[k] + c] * right[places[k] + c];
   }
 }
 
