@@ -25,14 +25,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 ROOT = Path(__file__).parent.parent / "srbf"
 CHECKS_ANNOTATIONS = bool(os.environ.get("SRBF_CHECK_ANNOTATIONS"))
 if CHECKS_ANNOTATIONS:
-    # Before srbf is first imported: shapes and dtypes of every annotated function are checked in all tests of this process, at a quarter
-    # to a third more time. Not the commands: typer reads their annotations its own way.
-    from jaxtyping import install_import_hook
+    # Before srbf is first imported: shapes and dtypes of every annotated function are checked in all tests of this process. Not the
+    # commands: typer reads their annotations its own way.
+    import annotation_checks
 
-    install_import_hook(
-        [f"srbf.{module.name}" for module in pkgutil.iter_modules([str(ROOT)]) if module.name not in ("cli", "__main__")],
-        "annotation_checks.check",
-    )
+    parts = [module.name for module in pkgutil.iter_modules([str(ROOT)])]
+    annotation_checks.install([f"srbf.{part}" for part in parts if part not in ("cli", "__main__")])
 
 from made_assets import build_asset, build_planes  # noqa: E402
 from made_captures import write_capture  # noqa: E402
@@ -72,6 +70,8 @@ def processor_time() -> float:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     item.stash[STARTED] = processor_time()
+    if CHECKS_ANNOTATIONS:
+        annotation_checks.next_test()
     return (yield)
 
 
