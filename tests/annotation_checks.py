@@ -27,7 +27,7 @@ def install(modules: Sequence[str]) -> None:
 
 
 def next_test() -> None:
-    """Every function is checked anew."""
+    """Every function is checked again."""
     global tests
     tests += 1
 
