@@ -38,6 +38,7 @@ from made_captures import write_capture  # noqa: E402
 from srbf.asset import Asset  # noqa: E402
 from srbf.capture import Capture  # noqa: E402
 from srbf.encode import position_table  # noqa: E402
+from srbf.export import loss  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
 
@@ -93,10 +94,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def coarse_tables_of_places() -> Iterator[None]:
-    """Of few nodes: each asks a method for the weights of a light, and thousands take seconds."""
+def coarse_tables_of_places_and_losses() -> Iterator[None]:
+    """Of few nodes: each asks a method for the weights of a light, and thousands take seconds. Of few lights, for each export."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(position_table, "MOST_NODES", 128)
+        patch.setattr(loss, "LIGHTS", 12)
         yield
 
 
