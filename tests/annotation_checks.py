@@ -1,5 +1,55 @@
-"""The type checker of the tests: beartype, with an int welcome where a float is annotated."""
+"""Run-time checks of annotations by jaxtyping and beartype, with an int welcome where a float is annotated.
 
+A function's checks are made when it is first called, and each test checks the first few calls of each: loops of thousands say no more.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from types import FunctionType
+from typing import Any
+
+import jaxtyping
 from beartype import BeartypeConf, beartype
 
+CALLS = 16  # of each function that a test checks
 check = beartype(conf=BeartypeConf(is_pep484_tower=True))
+whole = jaxtyping.jaxtyped
+tests = 0  # begun
+
+
+def install(modules: Sequence[str]) -> None:
+    """Have modules that are imported from now on checked: every function, and the fields of dataclasses."""
+    # Classes and properties hand it their functions.
+    jaxtyping.jaxtyped = jaxtyping._decorator.jaxtyped = first_calls  # type: ignore[assignment]
+    jaxtyping.install_import_hook(modules, None)
+
+
+def next_test() -> None:
+    """Every function is checked again."""
+    global tests
+    tests += 1
+
+
+def first_calls(what: Any = None, *, typechecker: Any = None) -> Any:
+    """In place of jaxtyping's decorator."""
+    if what is None:
+        return first_calls
+    if not isinstance(what, FunctionType):
+        return whole(what, typechecker=check)
+    checked: Callable[..., Any] | None = None
+    test = calls = 0
+
+    @functools.wraps(what)
+    def checks_some(*given: Any, **named: Any) -> Any:
+        nonlocal checked, test, calls
+        if test != tests:
+            test, calls = tests, 0
+        if calls == CALLS:
+            return what(*given, **named)
+        calls += 1
+        checked = checked or whole(what, typechecker=check)
+        return checked(*given, **named)
+
+    return checks_some

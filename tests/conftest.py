@@ -25,14 +25,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 ROOT = Path(__file__).parent.parent / "srbf"
 CHECKS_ANNOTATIONS = bool(os.environ.get("SRBF_CHECK_ANNOTATIONS"))
 if CHECKS_ANNOTATIONS:
-    # Before srbf is first imported: shapes and dtypes of every annotated function are checked in all tests of this process, at a quarter
-    # to a third more time. Not the commands: typer reads their annotations its own way.
-    from jaxtyping import install_import_hook
+    # Before srbf is first imported: shapes and dtypes of every annotated function are checked in all tests of this process. Not the
+    # commands: typer reads their annotations its own way.
+    import annotation_checks
 
-    install_import_hook(
-        [f"srbf.{module.name}" for module in pkgutil.iter_modules([str(ROOT)]) if module.name not in ("cli", "__main__")],
-        "annotation_checks.check",
-    )
+    parts = [module.name for module in pkgutil.iter_modules([str(ROOT)])]
+    annotation_checks.install([f"srbf.{part}" for part in parts if part not in ("cli", "__main__")])
 
 from made_assets import build_asset, build_planes  # noqa: E402
 from made_captures import write_capture  # noqa: E402
@@ -40,6 +38,7 @@ from made_captures import write_capture  # noqa: E402
 from srbf.asset import Asset  # noqa: E402
 from srbf.capture import Capture  # noqa: E402
 from srbf.encode import position_table  # noqa: E402
+from srbf.export import loss  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
 
@@ -72,6 +71,8 @@ def processor_time() -> float:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     item.stash[STARTED] = processor_time()
+    if CHECKS_ANNOTATIONS:
+        annotation_checks.next_test()
     return (yield)
 
 
@@ -93,10 +94,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def coarse_tables_of_places() -> Iterator[None]:
-    """Of few nodes: each asks a method for the weights of a light, and thousands take seconds."""
+def coarse_tables_of_places_and_losses() -> Iterator[None]:
+    """Of few nodes: each asks a method for the weights of a light, and thousands take seconds. Of few lights, for each export."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(position_table, "MOST_NODES", 128)
+        patch.setattr(loss, "LIGHTS", 12)
         yield
 
 

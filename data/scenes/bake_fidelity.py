@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes with what a bake may lose, on the receiver or over it: `python bake_fidelity.py NAME OUT.blend`.
 
-`python bake_fidelity.py bake IN.blend OBJECT OUT.npy X,Y,Z…` is Blender's own bake of the file, under a sun from each direction.
+`python bake_fidelity.py bake OUT.npz OBJECT "X,Y,Z X,Y,Z" IN.blend…` is Blender's own bake of each file, under a sun from each direction.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SCENES = {
 }
 
 
-def own_bake(blend, name, out, directions):
+def own_bake(blend, name, directions):
     """(suns, SIDE, SIDE, 3) irradiance of an object under each sun: Blender's own bake of the file as it is."""
     bpy.ops.wm.open_mainfile(filepath=blend)
     scene = bpy.context.scene
@@ -63,12 +63,14 @@ def own_bake(blend, name, out, directions):
         pixels = np.empty(SIDE * SIDE * 4, np.float32)
         image.pixels.foreach_get(pixels)
         images.append(pixels.reshape(SIDE, SIDE, 4)[::-1, :, :3] * math.pi)
-    np.save(out, np.stack(images))
+    return np.stack(images)
 
 
 if __name__ == "__main__":
     if sys.argv[1] == "bake":
-        own_bake(*sys.argv[2:5], [tuple(map(float, word.split(","))) for word in sys.argv[5:]])
+        out, name, suns, *blends = sys.argv[2:]
+        directions = [tuple(map(float, sun.split(","))) for sun in suns.split()]
+        np.savez(out, **{Path(blend).stem: own_bake(blend, name, directions) for blend in blends})
     else:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         SCENES[sys.argv[1]]()

@@ -35,12 +35,13 @@ class Programs:
         vertex_array = self._made[key]
         program = vertex_array.program
         for name, content in uniforms.items():
-            if name not in program:
+            uniform: Any = program.get(name, None)
+            if uniform is None:
                 continue  # the driver drops a uniform that cannot change the result
             if isinstance(content, np.ndarray):
-                program[name].write(np.ascontiguousarray(content))  # type: ignore[union-attr]
+                uniform.write(np.ascontiguousarray(content))
             else:
-                program[name].value = content  # type: ignore[union-attr]
+                uniform.value = content
         vertex_array.render(vertices=3)
 
     def target(self, size: tuple[int, int]) -> tuple[moderngl.Texture, moderngl.Framebuffer]:

@@ -91,9 +91,10 @@ def render(array: moderngl.VertexArray, uniforms: dict[str, Any], vertices: int 
 
 
 def _set(program: moderngl.Program, name: str, value: Any) -> None:
-    if name not in program:
+    uniform: Any = program.get(name, None)  # `name in program` would look through all of them
+    if uniform is None:
         return
     if isinstance(value, np.ndarray):
-        program[name].write(np.ascontiguousarray(value))  # type: ignore[union-attr]
+        uniform.write(np.ascontiguousarray(value))
     else:
-        program[name].value = value  # type: ignore[union-attr]
+        uniform.value = value

@@ -101,14 +101,12 @@ def parted(labels: Int[ndarray, " N"], seen: Bool[ndarray, "N F"]) -> Int[ndarra
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
-    result, total = np.empty(len(labels), np.int64), 0
-    for number in range(int(labels.max()) + 1):
-        members = np.flatnonzero(labels == number)
-        own = seen[members].astype(np.float32)
-        dark = ~own.any(axis=1, keepdims=True)
-        parts, part = connected_components(csr_array((own @ own.T > 0) | (dark & dark.T)), directed=False)
-        result[members] = total + part
-        total += parts
+    order = np.argsort(labels, kind="stable")  # parts are numbered by group, then by their first cells
+    place, cell = np.nonzero(np.column_stack([seen, ~seen.any(axis=1)])[order].T)
+    linked = (np.diff(place) == 0) & (np.diff(labels[order][cell]) == 0)  # each with the next of its group that a place sees
+    graph = csr_array((np.ones(linked.sum()), (cell[:-1][linked], cell[1:][linked])), shape=(len(labels), len(labels)))
+    result = np.empty(len(labels), np.int64)
+    result[order] = connected_components(graph, directed=False)[1]
     return result
 
 

@@ -124,11 +124,10 @@ def lit(
     result = np.zeros((len(points), len(free)), bool)
     scale = OFFSET * float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     starts = (points + scale * normals).astype(np.float32)
+    offsets = np.einsum("nk,nk->n", points, normals)
     for begin in range(0, len(points), max(1, RAYS // max(1, len(free)))):
         part = slice(begin, begin + max(1, RAYS // max(1, len(free))))
-        toward = free[None] - points[part, None]  # (b, F, 3)
-        front = np.einsum("bfk,bk->bf", toward, normals[part]) > 0
-        row, column = np.nonzero(front)
+        row, column = np.nonzero(normals[part] @ free.T > offsets[part, None])
         vector = free[column] - starts[part][row]
         distance = np.linalg.norm(vector, axis=1)
         blocked = occluders.occluded(starts[part][row], vector / np.maximum(distance, 1e-30)[:, None], distance)

@@ -15,7 +15,8 @@ ROOT = Path(__file__).parents[2]
 SCENES = ROOT / "data" / "scenes"
 # By which surfaces are taken apart: every cell is tried from every free place, so that more of them cost more than a small bake.
 FEW = {"visibility.patches.FEWEST_CELLS": 1000, "bake.light_sets.PLACES": 256}
-FEW |= {"bake.light_sets.SURFEL_PLACES": 1024, "bake.light_sets.SURFELS": 2000}
+FEW |= {"bake.light_sets.SURFEL_PLACES": 1024, "bake.light_sets.SURFELS": 2000, "bake.light_sets.FINGERPRINT_PATCHES": 128}
+FEW |= {"visibility.transfer_operator.MOST_RAYS": 1024}  # of a receiver
 
 
 def built(script: str, factory: pytest.TempPathFactory) -> Callable[[str], Path]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
@@ -26,9 +26,9 @@ def done(*words: object) -> Result:
     return result
 
 
-def of_a_process(*words: object) -> list[str]:
+def of_a_process(*words: object, few: Mapping[str, int] = FEW) -> list[str]:
     """The same command line for a process that can be killed."""
-    lines = [f"import srbf.{name.rpartition('.')[0]}; srbf.{name} = {few}" for name, few in FEW.items()]
+    lines = [f"import srbf.{name.rpartition('.')[0]}; srbf.{name} = {value}" for name, value in few.items()]
     return [sys.executable, "-c", "; ".join([*lines, "from srbf.cli import app", "app()"]), *map(str, words)]
 
 

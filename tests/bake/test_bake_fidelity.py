@@ -58,13 +58,15 @@ def bake(scene: Path, folder: Path, receiver: str = "lightmap:Ground", **setting
     return Baked(scene, folder, BakeSettings(Receiver.parse(receiver), **{**small, **settings}))
 
 
-def own(scene: Path, folder: Path) -> np.ndarray:
-    """(3, 32, 32, 3) Blender's own bake of the file."""
-    out = folder / "own.npy"
-    suns = [",".join(map(str, sun)) for sun in SUNS]
-    line = [sys.executable, str(SCENES / "bake_fidelity.py"), "bake", str(scene), "Ground", str(out), *suns]
-    subprocess.run(line, check=True, capture_output=True, timeout=120)
-    return np.load(out)
+@pytest.fixture(scope="module")
+def own(made, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> dict[str, np.ndarray]:
+    """(3, 32, 32, 3) Blender's own bake of each scene that a chosen test asks for, all by one process."""
+    of_tests = (item.callspec.params["name"] for item in request.session.items if "own" in item.fixturenames and hasattr(item, "callspec"))
+    out, suns = tmp_path_factory.mktemp("own") / "own.npz", " ".join(",".join(map(str, sun)) for sun in SUNS)
+    scenes = [str(made(name)) for name in {"hair": 0, **dict.fromkeys(of_tests)}]
+    line = [sys.executable, str(SCENES / "bake_fidelity.py"), "bake", str(out), "Ground", suns, *scenes]
+    subprocess.run(line, check=True, capture_output=True, timeout=300)
+    return dict(np.load(out))
 
 
 def check_equal(got: np.ndarray, expected: np.ndarray) -> None:
@@ -74,21 +76,20 @@ def check_equal(got: np.ndarray, expected: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("name", [*CARRIED, *OVERHEAD, *KEPT])
-def test_a_bake_has_the_light_of_blenders_own(made, tmp_path: Path, name: str) -> None:
-    expected = own(made(name), tmp_path)
+def test_a_bake_has_the_light_of_blenders_own(made, own: dict[str, np.ndarray], tmp_path: Path, name: str) -> None:
     capture = bake(made(name), tmp_path / "capture").capture
     got = np.stack([capture.image(i) for i in range(len(SUNS))])
-    check_equal(got, expected)
+    check_equal(got, own[name])
     cosines = np.array([z / np.linalg.norm((x, y, z)) for x, y, z in SUNS])
     assert (cosines - got.mean(axis=(1, 2, 3))).max() > LOST  # so that an empty scene would not pass
 
 
-def test_an_indirect_bake_keeps_hair_and_says_what_rays_will_miss(made, tmp_path: Path) -> None:
+def test_an_indirect_bake_keeps_hair_and_says_what_rays_will_miss(made, own: dict[str, np.ndarray], tmp_path: Path) -> None:
     baked = bake(made("hair"), tmp_path / "capture", transport="indirect")
     assert any("scene.glb" in line and "hair of 'Ground'" in line for line in baked.said)
     capture = baked.capture
     parts = [read_image(capture.folder / light["direct"]) for light in capture.manifest["lights"]]
-    check_equal(np.stack([capture.image(i) + part for i, part in enumerate(parts)]), own(made("hair"), tmp_path))
+    check_equal(np.stack([capture.image(i) + part for i, part in enumerate(parts)]), own["hair"])
 
 
 def test_fog_is_no_wall_in_the_scene_file(made, tmp_path: Path) -> None:

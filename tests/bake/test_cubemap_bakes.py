@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from light_set_commands import done, refused, scenes_in
+from light_set_commands import done, of_a_process, refused, scenes_in
 
-from srbf.bake import light_sets
 from srbf.bake.light_sets import LIGHT_SET_FILE
 from srbf.capture import COVERED, Capture
 from srbf.cubemap import Cubemap
@@ -26,14 +24,16 @@ FLOOR = ["--receiver", "lightmap:Floor", "--size", "24"]
 CUBEMAP = [*FLOOR, "--light-set", "cubemap:4", "--validation", "1", "--holdout", "2", "--seed", "77"]
 EDGES = 0.12  # relative RMSE: Cycles averages the footprint of each texel, rays see its middle
 STAGES = (LIGHT_SET_FILE, VISIBILITY_FILE, BOUNCES_FILE)
-PLACES = 512  # random free places, which say what is outside of solids; in the open air these do
-COMMAND = f"from srbf.bake import light_sets; light_sets.SURFEL_PLACES = {PLACES}; from srbf.cli import app; app()"
+# Random free places, which say what is outside of solids, in the open air these do; surfels; and rays from each of these and to each texel.
+FEW = {"bake.light_sets.SURFEL_PLACES": 512, "bake.cubemap_set.SURFELS": 500, "visibility.distant_bounces.SURFEL_RAYS": 512}
+FEW |= {"visibility.transfer_operator.MOST_RAYS": 1024}
 
 
 @pytest.fixture(scope="module", autouse=True)
-def few_places() -> Iterator[None]:
+def few_places_and_rays() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(light_sets, "SURFEL_PLACES", PLACES)
+        for name, few in FEW.items():
+            patch.setattr(f"srbf.{name}", few)
         yield
 
 
@@ -93,7 +93,7 @@ def test_sparse_sampling_is_near_the_full_one_and_reproducible(whole: Path, scen
 def test_a_bake_killed_after_a_stage_resumes(whole: Path, scene, tmp_path: Path, stage: str) -> None:
     folder = tmp_path / "killed"
     words = ["bake", scene("open_air"), "-o", folder, *CUBEMAP, "--full"]
-    process = subprocess.Popen([sys.executable, "-c", COMMAND, *map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(of_a_process(*words, few=FEW), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
     while not (folder / stage).is_file() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.005)

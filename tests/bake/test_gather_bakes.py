@@ -35,6 +35,14 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return scenes_in(tmp_path_factory)
 
 
+@pytest.fixture(scope="module")
+def floor_scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A room with a glossy floor."""
+    path = tmp_path_factory.mktemp("floor") / "floor.blend"
+    subprocess.run([sys.executable, str(SCENES / "glossy_floor.py"), str(path)], check=True, capture_output=True, timeout=120)
+    return path
+
+
 def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None:
     folder, asset = tmp_path / "capture", tmp_path / "asset"
     assert "pool of surfels" in done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0", "--dry-run").output
@@ -115,13 +123,12 @@ def test_a_camera_in_an_object_is_said(scene, tmp_path: Path) -> None:
     assert "the camera of the view sees almost nothing that light reaches" in said
 
 
-def test_gloss_is_relit_as_cycles_renders_it(tmp_path: Path) -> None:
+def test_gloss_is_relit_as_cycles_renders_it(floor_scene: Path, tmp_path: Path) -> None:
     """Direct light of lobes by rays and by shadow maps, what they reflect of the room, and the energy of both."""
-    scene, folder, asset = tmp_path / "floor.blend", tmp_path / "capture", tmp_path / "asset"
-    subprocess.run([sys.executable, str(SCENES / "glossy_floor.py"), str(scene)], check=True, capture_output=True, timeout=120)
+    folder, asset = tmp_path / "capture", tmp_path / "asset"
     done(
         "bake",
-        scene,
+        floor_scene,
         "-o",
         folder,
         *VIEW[:3],
@@ -160,13 +167,11 @@ def test_gloss_is_relit_as_cycles_renders_it(tmp_path: Path) -> None:
             assert np.sqrt(((near - direct)[floor] ** 2).sum() / (direct[floor] ** 2).sum()) < most, kind
 
 
-def test_gather_samples_of_lobes_are_one_bounce_of_links(tmp_path: Path) -> None:
+def test_gather_samples_of_lobes_are_one_bounce_of_links(floor_scene: Path, tmp_path: Path) -> None:
     """The paper's form on a glossy floor against ours with one bounce: lobes share the clusters by energy, and gather as much light."""
-    scene = tmp_path / "floor.blend"
-    subprocess.run([sys.executable, str(SCENES / "glossy_floor.py"), str(scene)], check=True, capture_output=True, timeout=120)
     size, own = [*VIEW[:4], "--light-set", "gather", "--seed", "77", "--holdout", "0"], {}
-    for form, flags in (("samples", ["--gather", "400", "--view-clusters", "300"]), ("links", ["--pool", "20000"])):
-        done("bake", scene, "-o", tmp_path / f"{form}-capture", *size, *flags)
+    for form, flags in (("samples", ["--gather", "400", "--view-clusters", "300"]), ("links", ["--pool", "8000"])):
+        done("bake", floor_scene, "-o", tmp_path / f"{form}-capture", *size, *flags)
         done("fit", tmp_path / f"{form}-capture", "-o", tmp_path / form)
         own[form] = Asset.open(tmp_path / form)
     found, capture = GatheredSamples.read(tmp_path / "samples-capture"), Capture.open(tmp_path / "samples-capture")

@@ -43,10 +43,11 @@ FEWER = """
 import bpy, sys
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 for name in ("Ring", "LeaningRing", "Angel", "AngelWings", "AngelHalo", "CrystalBall", "TableLegs"):
-    bpy.data.objects.remove(bpy.data.objects[name])  # one glass is left, the angel's foot: its transmittance is fitted in a second
+    bpy.data.objects.remove(bpy.data.objects[name])  # one glass is left, of the table alone: its transmittance is fitted in a second
 bpy.data.objects["Floor"].scale *= 0.3
 bpy.data.objects["Table"].name = sys.argv[2]
 if sys.argv[2] != "Table":
+    bpy.data.objects.remove(bpy.data.objects["AngelFoot"])
     for name, kind in (("Desk light", "POINT"), ("Window", "AREA")):
         light = bpy.data.objects.new(name, bpy.data.lights.new(name, kind))
         light.data.energy, light.location = 50, (0.3, 0.2, 1)
@@ -56,6 +57,7 @@ bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
 FRAMES = {"frames": [{"lights": [{"kind": "directional", "direction": [0, 0.5, 1], "color": [1, 1, 1]}]}, {"lights": []}]}
 FEW = {"bake.cubemap_set.SURFELS": 200, "bake.light_sets.SURFEL_PLACES": 400, "visibility.patches.FEWEST_CELLS": 400}
 FEW |= {f"visibility.transfer_operator.{name}_RAYS": 64 for name in ("FEWEST", "MOST", "SURFEL")}
+FEW |= {"methods.transfer.MOST_CLUSTERS": 4, "bake.light_sets.FINGERPRINT_PATCHES": 128}
 FEW |= {f"visibility.transfer_basis.{name}": 40 for name in ("PLACED", "MOST_PLACED", "NEAR", "SPOTS")}
 OUTPUTS = ("-o", "--output", "--save")
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # as activated

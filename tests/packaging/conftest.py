@@ -44,5 +44,5 @@ def installed(srbf_built: Distribution, tmp_path_factory: pytest.TempPathFactory
     """The wheel of srbf in an empty environment: no dependency may need a compiler."""
     environment = Environment(tmp_path_factory.mktemp("installed"), empty.nowhere)
     venv.create(environment.root, with_pip=True)
-    succeed(environment.python("-m", "pip", "install", "--only-binary", ":all:", srbf_built.wheel))
+    succeed(environment.python("-m", "pip", "install", "--no-compile", "--only-binary", ":all:", srbf_built.wheel))
     return environment

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import json
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -105,21 +107,54 @@ def test_the_picture_is_that_of_numpy(browser: Any, asset: Asset, url: str, run:
         np.testing.assert_allclose(picture, expected, atol=tolerance * max(expected.max(), 1e-9), err_msg=str(lights))
 
 
+CLOSE_TO_A_WALL = PointLight((0.03, 1.2, 0.9), (1, 0.5, 0.2), falloff="inverse-square")
+# In the open, close to a wall, whose light bright surfels send, and both.
+ON_LOBES: list[list[Light]] = [[LIGHTS["point"]], [CLOSE_TO_A_WALL], [CLOSE_TO_A_WALL, LIGHTS["area"]]]
+# 3 cm off a wall, in a corner, and beside the wall with the door, behind which less than all is seen of what is bright.
+NEAR_WALLS: list[list[Light]] = [
+    [PointLight(place, (1, 0.5, 0.2), falloff="inverse-square")] for place in ((0.03, 1.2, 0.9), (0.04, 0.05, 0.9), (1.47, 1.6, 0.5))
+]
+NEAR_WALLS.append([AreaLight((0.05, 1.0, 0.9), u=(0, 0.1, 0), v=(0, 0, -0.1)), LIGHTS["point"]])
+Pictures = Callable[[int], tuple[str, list[np.ndarray]]]
+
+
+def pictures_of(browser: Any, asset: Asset, sets: list[list[Light]]) -> Pictures:
+    """By a number of bounces, made once for all runs: where the page finds the asset, and its pictures by numpy."""
+
+    @functools.cache
+    def limited(bounces: int) -> tuple[str, list[np.ndarray]]:
+        few = replace(asset, manifest={**asset.manifest, "gather": {**asset.manifest["gather"], "bounces": bounces}})
+        return browser.serve(few), [methods.relight(few, lights) for lights in sets]
+
+    return limited
+
+
+@pytest.fixture(scope="module")
+def on_lobes(browser: Any, shiny: Asset) -> Pictures:
+    return pictures_of(browser, shiny, ON_LOBES)
+
+
+@pytest.fixture(scope="module")
+def near_walls(browser: Any, divided: Asset) -> Pictures:
+    return pictures_of(browser, divided, NEAR_WALLS)
+
+
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: "-".join(run.values()))
-def test_lobes_and_backs_show_what_numpy_says(browser: Any, shiny: Asset, run: dict[str, str]) -> None:
-    """Under a light in the open, one close to a wall, whose light bright surfels send, and both; with few bounces, all, and none."""
-    close = PointLight((0.03, 1.2, 0.9), (1, 0.5, 0.2), falloff="inverse-square")
-    sets: list[list[Light]] = [[LIGHTS["point"]], [close], [close, LIGHTS["area"]]]
+def test_lobes_and_backs_show_what_numpy_says(browser: Any, on_lobes: Pictures, run: dict[str, str]) -> None:
+    """With few bounces, all, and none."""
     told_bounces = (1, 12, 0) if run["run"] == "three-lightmap" else (12,)
     for bounces in told_bounces:
-        limited = replace(shiny, manifest={**shiny.manifest, "gather": {**shiny.manifest["gather"], "bounces": bounces}})
-        drawn = browser.lightmaps(asset=browser.serve(limited), light_sets=[told(*lights) for lights in sets], **run)
-        for picture, lights in zip(drawn, sets, strict=True):
-            expected = methods.relight(limited, lights)
+        url, pictures = on_lobes(bounces)
+        drawn = browser.lightmaps(asset=url, light_sets=[told(*lights) for lights in ON_LOBES], **run)
+        for picture, expected, lights in zip(drawn, pictures, ON_LOBES, strict=True):
             assert (expected.max() > 0) == (bounces > 0)
             np.testing.assert_allclose(picture, expected, atol=SEEN * max(expected.max(), 1e-9), err_msg=str(lights))
-    for lights in sets:
-        seen, others = (methods.relight(one, lights) for one in (shiny, with_backs(with_lobes(divided_of(shiny)))))
+
+
+def test_what_lobes_alone_see_is_seen(shiny: Asset) -> None:
+    without = with_backs(with_lobes(divided_of(shiny)))
+    for lights in ON_LOBES:
+        seen, others = (methods.relight(one, lights) for one in (shiny, without))
         assert np.abs(seen - others).max() > 10 * CLOSE * seen.max()
 
 
@@ -131,19 +166,17 @@ def divided_of(shiny: Asset) -> Asset:
 
 
 @pytest.mark.parametrize("run", RUNS[:2] + RUNS[4:], ids=lambda run: "-".join(run.values()))
-def test_bright_surfels_light_as_in_numpy(browser: Any, divided: Asset, run: dict[str, str]) -> None:
-    """Lights 3 cm off a wall, in a corner, and beside the wall with the door, behind which less than all is seen of what is bright."""
-    places = ((0.03, 1.2, 0.9), (0.04, 0.05, 0.9), (1.47, 1.6, 0.5))
-    sets: list[list[Light]] = [[PointLight(place, (1, 0.5, 0.2), falloff="inverse-square")] for place in places]
-    sets.append([AreaLight((0.05, 1.0, 0.9), u=(0, 0.1, 0), v=(0, 0, -0.1)), LIGHTS["point"]])
-    bare = without_near(divided)
+def test_bright_surfels_light_as_in_numpy(browser: Any, near_walls: Pictures, run: dict[str, str]) -> None:
     for bounces in (1, 12):
-        limited = replace(divided, manifest={**divided.manifest, "gather": {**divided.manifest["gather"], "bounces": bounces}})
-        drawn = browser.lightmaps(asset=browser.serve(limited), light_sets=[told(*lights) for lights in sets], **run)
-        for picture, lights in zip(drawn, sets, strict=True):
-            expected = methods.relight(limited, lights)
+        url, pictures = near_walls(bounces)
+        drawn = browser.lightmaps(asset=url, light_sets=[told(*lights) for lights in NEAR_WALLS], **run)
+        for picture, expected, lights in zip(drawn, pictures, NEAR_WALLS, strict=True):
             np.testing.assert_allclose(picture, expected, atol=CLOSE * expected.max(), err_msg=str(lights))
-    for lights in sets:
+
+
+def test_bright_surfels_are_seen(divided: Asset) -> None:
+    bare = without_near(divided)
+    for lights in NEAR_WALLS:
         expected = methods.relight(divided, lights)
         assert np.abs(methods.relight(bare, lights) - expected).max() > 10 * CLOSE * expected.max()
 
