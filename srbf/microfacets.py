@@ -8,7 +8,6 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64
-from srbf.sobol import sobol
 
 LEAST_ALPHA = 1e-3
 TABLE, TABLE_SAMPLES = 33, 4096  # of the lobe's own albedo, per side and sample
@@ -117,8 +116,10 @@ def _masking(cosine: ndarray, squared: ndarray) -> ndarray:
 
 @functools.lru_cache(maxsize=1)
 def _table() -> tuple[tuple[ndarray, ndarray], Float64[ndarray, "T T 2"]]:
+    from scipy.stats import qmc
+
     cosines, roughness = np.linspace(GRAZING, 1, TABLE), np.linspace(0, 1, TABLE)
-    square = sobol(TABLE_SAMPLES, 2)[None]
+    square = qmc.Sobol(2, scramble=False).random(TABLE_SAMPLES)[None]
     values = np.empty((TABLE, TABLE, 2))
     for i, cosine in enumerate(cosines):
         view = np.broadcast_to([np.sqrt(1 - cosine**2), 0.0, cosine], (TABLE, 1, 3))

@@ -10,13 +10,12 @@ from numpy import ndarray
 from srbf.arrays import Float, Float32, Float64, Int
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight
 from srbf.microfacets import alpha_of, reflected
-from srbf.sobol import sobol
 from srbf.unshadowed import irradiance_from
 from srbf.vectors import lengths
 from srbf.visibility.light_rays import CastingLight, has_extent, rays_towards
 from srbf.visibility.linked_triangles import lit_at
 from srbf.visibility.rays import RayTracer, Samples
-from srbf.visibility.receivers import Receivers
+from srbf.visibility.receivers import Receivers, spread_points
 from srbf.visibility.shadow_map import ShadowMapper
 
 POINTS, SIZED_POINTS, MOST_POINTS = 4, 32, 96  # of a pixel; of one that a light with a size lights; of one whose first points differ
@@ -71,7 +70,7 @@ class GlossyRays:
 
     def __init__(self, receivers: Receivers, tracer: RayTracer) -> None:
         self._receivers, self._tracer, self._pixels = receivers, tracer, GlossyPixels(receivers)
-        self._disc = sobol(MOST_POINTS, 4)[:, 2:]
+        self._disc = spread_points(MOST_POINTS)[:, 2:]
         self._first: list[tuple[Samples, ndarray]] = []
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:

@@ -15,7 +15,6 @@ from srbf.compute.threads import each, one_blas_thread
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.light_linking import Objects
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, has_size
-from srbf.sobol import sobol
 from srbf.unshadowed import irradiance_from
 from srbf.vectors import largest_component, lengths
 from srbf.visibility.embree import EmbreeTriangles
@@ -26,7 +25,7 @@ from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.linked_triangles import casting, lit_at, lit_triangles
 from srbf.visibility.material_albedo import MaterialAlbedo, nearest_pure
 from srbf.visibility.outlines import outlines
-from srbf.visibility.receivers import Receivers, hashed, pixel_filter
+from srbf.visibility.receivers import Receivers, hashed, pixel_filter, spread_points
 from srbf.visibility.shadow import rounded_share
 from srbf.visibility.shadow_rays import RAY_OFFSET, ShadowRays
 from srbf.visibility.surface import surface_at
@@ -80,7 +79,7 @@ class RayTracer:
         height, width = receivers.height, receivers.width
         self._turn = hashed(height, width, 4).reshape(-1, 4)
         self._most = max(self._count, MAX_SAMPLES)
-        points = sobol(self._most, 4)
+        points = spread_points(self._most)
         self._square, self._disc = points[:, :2], points[:, 2:]
         coverage = receivers.images.get("coverage")
         covered = np.ones(height * width, bool) if coverage is None else coverage.ravel() > 0

@@ -118,6 +118,13 @@ class Receivers:
         return flat & ((turned * normal).sum(axis=2) >= SAME_SURFACE_COS) & (length > 0) & real & neighbor
 
 
+def spread_points(count: int) -> Float64[ndarray, "S 4"]:
+    """`count` evenly spread points of the unit hypercube, best for powers of two [Sobol1967]."""
+    from scipy.stats import qmc
+
+    return qmc.Sobol(4, scramble=False).random_base2(max(0, int(np.ceil(np.log2(count)))))[:count]
+
+
 def disc_points(square: Float64[ndarray, "*s 2"]) -> Float64[ndarray, "*s 2"]:
     """Area-preserving map of the unit square to the unit disc."""
     radius, turn = np.sqrt(square[..., 0]), 2 * np.pi * square[..., 1]

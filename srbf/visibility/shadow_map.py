@@ -15,7 +15,6 @@ from srbf.errors import ShaderError
 from srbf.gl.context import Limits, create_context
 from srbf.light_linking import Objects
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, has_size, triple
-from srbf.sobol import sobol
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.gl_resources import ProfileTextures, Resources, render
 from srbf.visibility.light_rays import CastingLight
@@ -23,7 +22,7 @@ from srbf.visibility.linked_triangles import casting, lit_at, lit_triangles
 from srbf.visibility.looks import look_of, looks_over
 from srbf.visibility.lookup_points import EDGE_PARTS, LookupPoints
 from srbf.visibility.map_lookups import Lookups, PixelLookups, visible_part
-from srbf.visibility.receivers import Receivers, disc_points
+from srbf.visibility.receivers import Receivers, disc_points, spread_points
 from srbf.visibility.shadow_casters import POINT_STAGES, SUN_STAGES, ShadowCasters, ShadowMaps
 from srbf.visibility.sun_cascades import Cascades, uniforms_of
 
@@ -257,6 +256,6 @@ def _suns(direction: Float64[ndarray, " 3"], angle: float) -> Iterator[Float64[n
     across = np.cross(direction, [1.0, 0.0, 0.0] if abs(direction[0]) < 0.9 else [0.0, 1.0, 0.0])
     across /= np.linalg.norm(across)
     up = np.cross(direction, across)
-    for x, y in disc_points(sobol(SUN_SAMPLES, 4)[:, 2:]) * np.tan(angle / 2):
+    for x, y in disc_points(spread_points(SUN_SAMPLES)[:, 2:]) * np.tan(angle / 2):
         vector = direction + x * across + y * up
         yield vector / np.linalg.norm(vector)

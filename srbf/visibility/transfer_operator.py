@@ -15,13 +15,12 @@ from srbf.arrays import Float32, Float64, Int
 from srbf.errors import ImageError
 from srbf.io import files
 from srbf.io.image import read_image, write_image
-from srbf.sobol import sobol
 from srbf.visibility.aimed_factors import AimedFactors
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.environment_cells import EnvironmentRows, Openings
 from srbf.visibility.form_factors import RayOrigins, factors_and_environment, form_factors
 from srbf.visibility.lightmap_points import LightmapPoints
-from srbf.visibility.receivers import Receivers
+from srbf.visibility.receivers import Receivers, spread_points
 from srbf.visibility.surface_cells import Cells
 from srbf.visibility.surfels import Surfels
 
@@ -185,7 +184,7 @@ class _LightmapPoints:
 
     def __init__(self, receivers: Receivers, seed: int) -> None:
         self._points = LightmapPoints(receivers, EmbreeTriangles(receivers.triangles.corners).first_hit)
-        self._square = sobol(POINTS, 2)
+        self._square = spread_points(POINTS)[:, :2]
         self._seed = seed
 
     def origins(self, rows: Int[ndarray, " n"]) -> RayOrigins:
