@@ -65,7 +65,11 @@ def view(
     port: Annotated[int, typer.Option(metavar="NUMBER", parser=PORT, help="On 127.0.0.1; 0: any that is free.")] = 0,
     save: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write one HTML file that opens from the disk, and serve nothing.", show_default=False),
+        typer.Option(
+            metavar="PAGE",
+            help="Serve nothing, and write NAME.html, one file that opens from the disk, or a folder for any static host.",
+            show_default=False,
+        ),
     ] = None,
     force: Force = False,
     browser: Annotated[bool, typer.Option(help="Open the page, or print its address only.")] = True,
@@ -88,15 +92,17 @@ def view(
         raise typer.BadParameter("expected --scene with --blender, found none")
     if scene is not None:
         if save is not None:
-            raise typer.BadParameter("expected --scene without --save, found both: one file has no server that renders")
+            raise typer.BadParameter("expected --scene without --save, found both: what is saved has no server that renders")
         from srbf.asset import Asset
         from srbf.viewer.cycles import CyclesRenders
 
         renders = CyclesRenders(Asset.open(assets[0]), scene, blender, profiles)
     environments = [(path.name, read_environment(path)) for path in environment or ()]
-    contents = contents_of(assets, None if save else capture, mesh, probes, renders, profiles, environments)
+    if capture is not None and save is not None and _is_file(save):
+        raise typer.BadParameter("expected --save of a file without a capture, whose images it does not hold; name a folder")
+    contents = contents_of(assets, capture, mesh, probes, renders, profiles, environments)
     if save is not None:
-        _save(save, contents, capture, force)
+        _save(save, contents, force)
     else:
         serve(contents, port, browser, renders)
 
@@ -119,15 +125,23 @@ def serve(contents: dict[str, Content], port: int = 0, browser: bool = True, ren
         server.server_close()
 
 
-def _save(path: Path, contents: dict[str, Content], capture: Path | None, force: bool) -> None:
-    if capture is not None:
-        raise typer.BadParameter("expected --save without a capture: one file does not hold its images")
-    if path.exists() and not (force and path.is_file()):
-        raise OutputExistsError(f"expected no {path} yet, found one; choose another name, or add --force")
-    from srbf.viewer.single_file import single_file
+def _is_file(path: Path) -> bool:
+    return path.suffix.lower() in (".html", ".htm")
 
-    write_text(path, single_file(contents))
-    note(f"wrote {path}, {path.stat().st_size / (1 << 20):.1f} MiB")
+
+def _save(path: Path, contents: dict[str, Content], force: bool) -> None:
+    if _is_file(path):
+        if path.exists() and not (force and path.is_file()):
+            raise OutputExistsError(f"expected no {path} yet, found one; choose another name, or add --force")
+        from srbf.viewer.single_file import single_file
+
+        write_text(path, single_file(contents))
+        size = path.stat().st_size
+    else:
+        from srbf.viewer.folder import write_page
+
+        size = write_page(contents, path, force)
+    note(f"wrote {path}, {size / (1 << 20):.1f} MiB")
 
 
 def _open(url: str) -> None:

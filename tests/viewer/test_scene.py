@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,11 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 from test_page import HEIGHT, PANEL, STEP, WIDTH, ZOOM, lights_of, shown_as
+from typer.testing import CliRunner, Result
 from view_assets import project, seen_room
 from web_assets import complete, on_a_plane
 
 from srbf.asset import Asset
 from srbf.capture import Capture
+from srbf.cli import app
 from srbf.export.gltf import model
 from srbf.io.glb import Glb
 from srbf.io.image import read_image
@@ -196,3 +199,27 @@ def test_the_capture_stands_beside_what_is_relit(chromium: Any, compared: tuple[
     sure = np.abs(difference) > 0.05
     assert sure.mean() > 0.5
     assert ((seen[..., 0] > seen[..., 2]) == (difference > 0))[sure].all()
+
+
+def test_a_saved_folder_compares_on_any_host(
+    chromium: Any, compared: tuple[Asset, Capture, str], serve_static: Callable[[Path], str], tmp_path: Path
+) -> None:
+    """It holds the capture's images and errors; it is replaced if that is asked for, and nothing else is."""
+    _, capture, _ = compared
+    line = ["view", str(tmp_path / "asset"), str(capture.folder), "--save"]
+
+    def saved(*words: object) -> Result:
+        return CliRunner().invoke(app, [*line, *map(str, words)])
+
+    assert saved(tmp_path / "page.html").exit_code == 2, "one file has no capture"
+    done = saved(tmp_path / "site")
+    assert done.exit_code == 0, done.output
+    assert saved(tmp_path / "site").exit_code == 1
+    assert saved(tmp_path / "site", "--force").exit_code == 0
+    assert saved(tmp_path / "asset", "--force").exit_code == 1
+    nearest = int(np.argmax(capture.directions() @ [-0.45, -0.5, 0.74]))
+    start = f"#{{'zoom':{ZOOM},'middle':[7,4.5],'exposure':-1,'compare':'reference'}}"
+    chromium("open", url=serve_static(tmp_path / "site") + start, width=WIDTH, height=HEIGHT)
+    assert (np.abs(chromium.texels(14, 9, ZOOM) - shown_as(capture.image(nearest), -1)) <= STEP).all()
+    errors = json.loads((tmp_path / "site" / "capture" / "errors-0.json").read_text())
+    assert len(json.dumps(errors)) > 100
