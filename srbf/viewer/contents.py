@@ -17,6 +17,7 @@ from srbf.light_domain import domain_of_asset
 from srbf.light_profile import Profile
 from srbf.lights import EnvironmentLight
 from srbf.methods import method_of
+from srbf.methods.environment_table import has_environment_table
 from srbf.viewer import light_tables, page_manifest
 from srbf.viewer.built_page import page_files
 from srbf.viewer.cycles import PLACE, CyclesRenders
@@ -26,7 +27,7 @@ from srbf.viewer.site import shown_mesh
 
 CAPTURE = "capture/"
 PROBES = "probes/"
-UNDER_ENVIRONMENTS = ("directions", "pool")  # kinds of lights of assets that the page shows under environments
+UNDER_ENVIRONMENTS = ("directions", "pool")  # kinds of lights whose assets the page always shows under environments
 
 Content = bytes | Path | Callable[[], bytes]
 
@@ -62,9 +63,9 @@ def contents_of(
             raise InputError(f"expected an asset that the page shows, found {asset.method} in {folder}; `srbf relight` shows it")
         if profiles and not method_of(asset).takes_profiles:
             raise InputError(f"expected an asset of lights inside the scene for profiles, found {asset.method} in {folder}; leave them out")
-        if environments and domain_of_asset(asset.manifest).kind not in UNDER_ENVIRONMENTS:
+        if environments and not (domain_of_asset(asset.manifest).kind in UNDER_ENVIRONMENTS or has_environment_table(asset)):
             raise InputError(
-                "expected an asset of distant lights or a deep framebuffer for an environment, "
+                "expected an asset of distant lights, a deep framebuffer or a room with windows for an environment, "
                 f"found {asset.method} in {folder}; leave it out"
             )
     _check_siblings(assets, folders)

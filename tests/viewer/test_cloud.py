@@ -12,12 +12,14 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from cloud_assets import PATCHES, PLACES, Room, room, with_table
+from cloud_assets import PATCHES, PLACES, Room, room, with_table, with_transfer
 from test_page import HEIGHT, STEP, WIDTH, ZOOM, shown_as
 from test_web_cloud import AREA, POINT, SPHERE, SPOT, received
+from test_web_environments import ENVIRONMENT, MAP, expected_of, with_windows
 
+from srbf.errors import InputError
 from srbf.io.image import write_image
-from srbf.lights import AreaLight, PointLight, SphereLight, SpotLight
+from srbf.lights import AreaLight, EnvironmentLight, PointLight, SphereLight, SpotLight
 
 EXPOSURE = -3.0
 HOLDOUT = np.float32(1.1)  # of captured images over the room's
@@ -127,6 +129,23 @@ def test_large_lights_cast_soft_shadows(chromium: Any, made: Room, url: str, kin
     opened(chromium, url, terms="direct", lights=[state])
     apart = np.abs(chromium.texels(14, 9, ZOOM)[..., 0] - shown_as(expected[..., None], EXPOSURE)[..., 0])
     assert np.median(apart) <= 2 and apart.mean() <= 5, (np.quantile(apart, [0.5, 0.9, 1]), apart.mean())
+
+
+def test_an_environment_shines_through_windows_and_turns(chromium: Any, serve: Callable[..., str], tmp_path: Path) -> None:
+    """The one that the page begins with: alone, turned, and brighter beside a light inside; a closed room takes none."""
+    windows, table = with_windows(with_transfer(with_table(room())[0]))
+    windows.write(tmp_path / "asset")
+    opened(chromium, serve(tmp_path / "asset", environments=[("around.exr", EnvironmentLight(MAP))]))
+    around = {**ENVIRONMENT, "color": [1.0, 1.0, 1.0]}
+    for turn in (0, 75):
+        chromium("number", name="Turn (°)", value=turn)
+        expected = shown_as(expected_of(windows, table, [{**around, "turn": np.radians(turn)}]), EXPOSURE)
+        assert expected.mean() > 40
+        assert (np.abs(chromium.texels(14, 9, ZOOM) - expected) <= STEP + 1).all()
+    made, _ = with_table(room())
+    made.write(tmp_path / "closed")
+    with pytest.raises(InputError, match="or a room with windows for an environment"):
+        serve(tmp_path / "closed", environments=[("around.exr", EnvironmentLight(MAP))])
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ export interface EnvironmentManifest extends Manifest {
 }
 
 export class EnvironmentTable {
-  private readonly known = new WeakMap<EnvironmentLight, { from: string; weights: Float64Array }>();
+  private readonly known = new WeakMap<object, { frame: string; weights: Float64Array }>(); // by a map's pixels: its weights in white
 
   private constructor(
     private readonly side: number,
@@ -31,15 +31,18 @@ export class EnvironmentTable {
     return new EnvironmentTable(side, cells, await readTable(files, told, rank, cells.length));
   }
 
-  /** Weights of the shapes, (r, 3), under a map; those of a light that is the same object are not computed again. */
+  /** Weights of the shapes, (r, 3), under a map; in another color they are not computed again. */
   weights(light: EnvironmentLight, assetFromWorld: Matrix4): Float64Array {
-    const from = String(assetFromWorld);
-    const found = this.known.get(light);
-    if (found?.from === from) return found.weights;
-    const radiance = cellRadiance(light, this.side, assetFromWorld);
-    const weights = summed(this.table, Float64Array.from({ length: 3 * this.cells.length }, (_, i) => radiance[3 * this.cells[Math.floor(i / 3)] + (i % 3)]));
-    this.known.set(light, { from, weights });
-    return weights;
+    const frame = String(mapFrame(light, assetFromWorld));
+    const found = this.known.get(light.pixels as object);
+    const weights = found?.frame === frame ? found.weights : this.white(light, assetFromWorld);
+    this.known.set(light.pixels as object, { frame, weights });
+    return weights.map((value, i) => value * light.color[i % 3]);
+  }
+
+  private white(light: EnvironmentLight, assetFromWorld: Matrix4): Float64Array {
+    const radiance = cellRadiance({ ...light, color: [1, 1, 1] }, this.side, assetFromWorld);
+    return summed(this.table, Float64Array.from({ length: 3 * this.cells.length }, (_, i) => radiance[3 * this.cells[Math.floor(i / 3)] + (i % 3)]));
   }
 }
 

@@ -1,19 +1,23 @@
 /** What lights add to the weights of a transfer asset's shapes without light on its surfels: objects that emit, and environments. */
 import type { LightsInAssetFrame } from "./asset_frame";
 import { SrbfError } from "./errors";
-import type { EnvironmentLight } from "./lights";
 import type { Tables } from "./methods/method";
 import { changeable } from "./surface_changes";
 
 export type ShapeLights = Pick<LightsInAssetFrame, "named" | "environments" | "assetFromWorld">;
 
-const numbers = new WeakMap<EnvironmentLight, number>(); // of environments that were asked for
+const numbers = new WeakMap<object, number>(); // of the pixels of environments that were asked for
 let last = 0;
 
 /** What `shapeWeights` depend on, of one asset whose albedo stays. */
 export function shapeState({ named, environments, assetFromWorld }: ShapeLights): string {
-  for (const light of environments) if (!numbers.has(light)) numbers.set(light, ++last);
-  return JSON.stringify([named, environments.map((light) => numbers.get(light)), environments.length ? assetFromWorld : 0]);
+  return JSON.stringify([named, environments.map(({ pixels, color, turn }) => [numberOf(pixels as object), color, turn]), environments.length ? assetFromWorld : 0]);
+}
+
+function numberOf(pixels: object): number {
+  const number = numbers.get(pixels) ?? ++last;
+  numbers.set(pixels, number);
+  return number;
 }
 
 /** (r, 3); undefined where there are none of these lights. @throws SrbfError where the asset does not know their like. */

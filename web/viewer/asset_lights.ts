@@ -21,7 +21,7 @@ export const inside = ({ manifest }: Asset): boolean => ["cloud", "surfels", "po
 /** Kinds of lights that one can add. */
 export function kindsOf(asset: Asset): readonly AddedKind[] {
   if (asset.tables.gather) return ["point", "spot", "sphere", "area", "directional", "environment"];
-  if (inside(asset)) return ["point", "spot", "sphere", "area"];
+  if (inside(asset)) return ["point", "spot", "sphere", "area", ...(asset.tables.environment ? (["environment"] as const) : [])];
   return asset.position ? ["directional", "point", "spot", "environment"] : ["directional", "environment"];
 }
 

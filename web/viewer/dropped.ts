@@ -16,7 +16,7 @@ export async function droppedFrames(file: File, state: State, usual: "linear" | 
 
 /** Add an environment map, as `shineEnvironment`. @throws SrbfError where the asset takes none, there are too many lights, or it cannot be read. */
 export async function droppedEnvironment(file: File, state: State, environments: Map<string, Environment>, takes: boolean): Promise<void> {
-  if (!takes) throw new SrbfError("expected an asset of distant lights or a deep framebuffer for an environment, found one of other lights");
+  if (!takes) throw new SrbfError("expected an asset of distant lights, a deep framebuffer or a room with windows for an environment, found one that knows none");
   environments.set(file.name, await readEnvironment(file));
   shineEnvironment(file.name, state);
 }
