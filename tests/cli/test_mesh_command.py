@@ -50,7 +50,6 @@ def test_scene_and_output(scene: Path, tmp_path: Path) -> None:
     ("receiver", "found"),
     [
         ({"kind": "view", "camera": "Camera"}, "view"),
-        ({"kind": "probes", "count": 3}, "probes"),
         (None, "none"),  # photographs
     ],
 )
