@@ -64,3 +64,23 @@ export function* environmentTexels(width: number, height: number, domain: "spher
     }
   }
 }
+
+/** A map whose texels are averaged by solid angle, as far as `rows` are left and both sides can be divided; else the same. */
+export function reduced(light: EnvironmentLight, rows: number): EnvironmentLight {
+  const { width, height, pixels } = light;
+  let factor = Math.floor(height / rows);
+  while (factor > 1 && (height % factor || width % factor)) --factor;
+  if (factor <= 1) return light;
+  const [across, down] = [width / factor, height / factor];
+  const out = new Float64Array(3 * across * down);
+  const above = (row: number) => Math.cos((row * Math.PI) / height); // the sine of a row's upper edge
+  for (let row = 0; row < height; ++row) {
+    const block = Math.floor(row / factor);
+    const share = (above(row) - above(row + 1)) / (above(factor * block) - above(factor * (block + 1))) / factor;
+    for (let column = 0; column < width; ++column) {
+      const to = 3 * (block * across + Math.floor(column / factor));
+      for (let c = 0; c < 3; ++c) out[to + c] += share * pixels[3 * (row * width + column) + c];
+    }
+  }
+  return { ...light, width: across, height: down, pixels: out };
+}

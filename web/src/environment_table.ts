@@ -1,5 +1,5 @@
 /** Environment maps of a transfer asset, without rays: what each cell of directions that its surfels see adds to the weights of the shapes. */
-import { environmentTexels, mapFrame } from "./environment";
+import { environmentTexels, mapFrame, reduced } from "./environment";
 import { SrbfError } from "./errors";
 import type { AssetFiles } from "./files";
 import { type LightValues, readTable, summed, type TableEntry } from "./light_values";
@@ -15,7 +15,7 @@ export interface EnvironmentManifest extends Manifest {
 }
 
 export class EnvironmentTable {
-  private readonly known = new WeakMap<object, { frame: string; weights: Float64Array }>(); // by a map's pixels: its weights in white
+  private readonly known = new WeakMap<object, { map: EnvironmentLight; frame: string; weights: Float64Array }>(); // by a map's pixels: a small one, and its weights
 
   private constructor(
     private readonly side: number,
@@ -35,13 +35,14 @@ export class EnvironmentTable {
   weights(light: EnvironmentLight, assetFromWorld: Matrix4): Float64Array {
     const frame = String(mapFrame(light, assetFromWorld));
     const found = this.known.get(light.pixels as object);
-    const weights = found?.frame === frame ? found.weights : this.white(light, assetFromWorld);
-    this.known.set(light.pixels as object, { frame, weights });
+    const map = found?.map ?? reduced({ ...light, color: [1, 1, 1] }, ROWS * this.side);
+    const weights = found?.frame === frame ? found.weights : this.white({ ...map, turn: light.turn }, assetFromWorld);
+    this.known.set(light.pixels as object, { map, frame, weights });
     return weights.map((value, i) => value * light.color[i % 3]);
   }
 
-  private white(light: EnvironmentLight, assetFromWorld: Matrix4): Float64Array {
-    const radiance = cellRadiance({ ...light, color: [1, 1, 1] }, this.side, assetFromWorld);
+  private white(map: EnvironmentLight, assetFromWorld: Matrix4): Float64Array {
+    const radiance = cellRadiance(map, this.side, assetFromWorld);
     return summed(this.table, Float64Array.from({ length: 3 * this.cells.length }, (_, i) => radiance[3 * this.cells[Math.floor(i / 3)] + (i % 3)]));
   }
 }

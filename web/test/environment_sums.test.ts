@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { environmentLight, IDENTITY, type Matrix4, type Triple } from "../src";
-import { environmentSamples } from "../src/environment";
+import { environmentSamples, reduced } from "../src/environment";
+import { cellRadiance } from "../src/environment_table";
 import { GaussianSums } from "../src/environment_sums";
 
 const QUARTER: Matrix4 = [[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]];
@@ -24,27 +25,46 @@ function noise(width: number, height: number, sun: number): Float32Array {
   return pixels;
 }
 
-const COUNT = 1200;
+const COUNT = 400;
 
 /** The exact sums over all texels at some of the centers, and those that are found there. */
 function both(region: "sphere" | "hemisphere", spread: number, frame: Matrix4, turn: number): [Float64Array, Float64Array] {
-  const [width, height] = [200, 100];
+  const [width, height] = [160, 80];
   const centers = spiral(COUNT);
   const some = centers.filter((_, i) => i % 30 === 0 || i === COUNT - 1);
-  const light = environmentLight(width, height, noise(width, height, 50 * width + 33), [1, 2, 0.5], turn);
+  const light = environmentLight(width, height, noise(width, height, 40 * width + 33), [1, 2, 0.5], turn);
   const [exact, found] = [new Float64Array(3 * some.length), new Float64Array(3 * COUNT)];
   new GaussianSums(some, spread, region).addDistant(environmentSamples(light, region, frame), exact);
   new GaussianSums(centers, spread, region).addEnvironment(light, frame, found);
   return [exact, Float64Array.from(exact, (_, i) => found[3 * centers.indexOf(some[Math.floor(i / 3)]) + (i % 3)])];
 }
 
+describe("a reduced environment map", () => {
+  it("has the light of the whole one", () => {
+    const light = environmentLight(180, 90, noise(180, 90, 4000), [1, 1, 1]);
+    const small = reduced(light, 25);
+    expect([small.width, small.height]).toEqual([60, 30]);
+    const total = (map: typeof light) => [...environmentSamples(map, "sphere", IDENTITY)].reduce((sum, [, [r]]) => sum + r, 0);
+    expect(total(small)).toBeCloseTo(total(light), 6);
+    const smooth = environmentLight(180, 90, Float32Array.from({ length: 3 * 180 * 90 }, (_, i) => 1 + Math.sin(i / 3 / 180 / 15)));
+    const [cells, expected] = [reduced(smooth, 30), smooth].map((map) => cellRadiance(map, 3, IDENTITY));
+    cells.forEach((value, i) => expect(Math.abs(value - expected[i])).toBeLessThan(0.03));
+  });
+
+  it("stays where its sides cannot be divided", () => {
+    const light = environmentLight(202, 101, noise(202, 101, 7));
+    expect(reduced(light, 30)).toBe(light);
+    expect(reduced(light, 101)).toBe(light);
+  });
+});
+
 describe("an environment map of many texels", () => {
   it.each([
-    ["sphere", 0.06, IDENTITY, 0],
-    ["sphere", 0.06, TWICE_TIPPED, 1],
+    ["sphere", 0.15, IDENTITY, 0],
+    ["sphere", 0.15, TWICE_TIPPED, 1],
     ["sphere", 0.4, QUARTER, -2.5],
-    ["hemisphere", 0.06, QUARTER, 0.3],
-    ["hemisphere", 0.06, TWICE_TIPPED, 0.3],
+    ["hemisphere", 0.15, QUARTER, 0.3],
+    ["hemisphere", 0.15, TWICE_TIPPED, 0.3],
   ] as const)("has the sums of its texels on the %s, of spread %s", (region, spread, frame, turn) => {
     const [exact, found] = both(region, spread, frame, turn);
     const most = exact.reduce((a, b) => Math.max(a, b), 0);
@@ -54,7 +74,7 @@ describe("an environment map of many texels", () => {
   });
 
   it("turns as its centers turn back", () => {
-    const light = environmentLight(200, 100, noise(200, 100, 9000), [1, 1, 1], Math.PI / 2);
+    const light = environmentLight(160, 80, noise(160, 80, 5000), [1, 1, 1], Math.PI / 2);
     const centers = spiral(COUNT);
     const [turned, still] = [new Float64Array(3 * COUNT), new Float64Array(3 * COUNT)];
     new GaussianSums(centers, 0.1, "sphere").addEnvironment(light, IDENTITY, turned);
