@@ -20,7 +20,7 @@ import numpy as np
 from numpy import ndarray
 from scipy import ndimage
 
-from srbf.asset import Asset, LayerEncoding
+from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.encode.quantization import quantize, round_together
 from srbf.encode.uv_seams import Stitch
@@ -37,6 +37,7 @@ from srbf.methods import responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
+from srbf.stored_layers import LayerEncoding
 
 MIB = 1 << 20
 SIDE = 1024

@@ -20,7 +20,7 @@ from typing import get_args
 
 import numpy as np
 
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
 from srbf.captured_light import Role
 from srbf.encode.quantization import quantize
@@ -35,6 +35,7 @@ from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.receiver_images import MANIFEST, Quantity
 from srbf.sphere import domain_of, normalize, point_set
+from srbf.stored_layers import layer_entries
 
 Method = RelightingMap | EigenMap | ClusteredEigenMap
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
@@ -27,11 +27,10 @@ from srbf.receiver_images import Quantity
 from srbf.registry import method_named
 from srbf.schemas import check_version
 from srbf.sphere import Domain
+from srbf.stored_layers import DTYPE, ENCODING, TEXEL_BITS, LayerEncoding, layer_entries
 
 if TYPE_CHECKING:
     from srbf.methods.protocol import Method
-
-LayerEncoding = Literal["half", "float", "uint8", "bc7", "bc1"]  # the last two: blocks of a texture array, bytes once decoded
 
 MANIFEST = ASSET_MANIFEST
 GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo", *GLOSS, THROUGH)
@@ -154,7 +153,7 @@ class Asset:
     @property
     def held(self) -> Encoding:
         """What `stored` is in memory: blocks are bytes there."""
-        return _ENCODING[self.stored.dtype.name]
+        return ENCODING[self.stored.dtype.name]
 
     @property
     def levels(self) -> int:
@@ -429,7 +428,7 @@ class Asset:
         for name, table in self.tables.items():
             entry = self.manifest[name]
             pixels = pack(table, entry["packed"]) if "packed" in entry else np.atleast_3d(table[None] if table.ndim == 1 else table)
-            images.append((folder / entry["file"], pixels, _ENCODING[pixels.dtype.name], "packed" in entry))
+            images.append((folder / entry["file"], pixels, ENCODING[pixels.dtype.name], "packed" in entry))
         write_images([*images, *((folder / self.manifest[name], image, "float", False) for name, image in self.images.items())])
         if self.scene is not None:
             (folder / self.manifest["scene"]).write_bytes(self.scene)
@@ -481,7 +480,7 @@ class Asset:
         if any("layer" in entry for entry in layers) or encoding in ("bc7", "bc1"):
             stored = read_layers(reader, layers, channels, path)
         else:
-            stored = np.empty((len(layers), manifest["height"], manifest["width"], channels), _DTYPE[encoding])
+            stored = np.empty((len(layers), manifest["height"], manifest["width"], channels), DTYPE[encoding])
             for target, entry in zip(stored, layers, strict=True):
                 pixels = reader.image(entry["file"], channels)
                 target[...] = np.round(pixels * 255) if encoding == "uint8" else pixels
@@ -494,27 +493,8 @@ class Asset:
         return Asset(manifest, stored, scale, bias, tables, images, scene, probes_of(manifest.get("receiver", {}), reader.pixels))
 
 
-TEXEL_BITS: dict[LayerEncoding, int] = {"half": 64, "float": 128, "uint8": 32, "bc7": 8, "bc1": 4}  # of a layer
-_DTYPE: dict[str, Any] = {"half": np.float16, "float": np.float32, "uint8": np.uint8}
-_ENCODING: dict[str, Encoding] = {"float16": "half", "float32": "float", "uint8": "uint8"}
-SUFFIX: dict[Encoding, str] = {"half": "exr", "float": "exr", "uint8": "png"}
-
-
 def _method(manifest: dict[str, Any], path: Path) -> type[Method]:
     try:
         return method_named(str(manifest.get("method")))
     except InputError as error:
         raise ManifestError(f"{error} in {path}") from None
-
-
-def layer_entries(stem: str, encoding: Encoding, scale: Float32[ndarray, "N C"], bias: Float32[ndarray, "N C"]) -> list[dict]:
-    """The manifest's list of stored layers: file, encoding, scale, bias."""
-    return [
-        {
-            "file": f"{stem}_{i:02d}.{SUFFIX[encoding]}",
-            "encoding": encoding,
-            "scale": scale[i].astype(float).tolist(),
-            "bias": bias[i].astype(float).tolist(),
-        }
-        for i in range(len(scale))
-    ]

@@ -470,14 +470,6 @@ def refuse_named(lights: Sequence[Light], method: str) -> None:
         raise InputError(f"expected lights inside the scene for a {method} asset, found a named one; bake `light_set=named` to mix lights")
 
 
-def refuse_profiles(lights: Sequence[Light], method: str) -> None:
-    """InputError where one of the lights has a profile, of an asset whose method takes none."""
-    if any(isinstance(light, PointLight) and light.profile is not None for light in lights):
-        raise InputError(
-            f"expected lights without a profile for a {method} asset, found one; capture the scene with `light_set=surfels` or `gather`"
-        )
-
-
 def triple(value: object, name: str = "a vector") -> Triple:
     """Three finite numbers as a tuple of floats; InputError for others, with `name` in its text."""
     try:

@@ -9,6 +9,7 @@ import functools
 from collections.abc import Callable, Sequence
 from types import FunctionType
 from typing import Any
+from unittest import mock
 
 import jaxtyping
 from beartype import BeartypeConf, beartype
@@ -21,8 +22,7 @@ tests = 0  # begun
 
 def install(modules: Sequence[str]) -> None:
     """Have modules that are imported from now on checked: every function, and the fields of dataclasses."""
-    # Classes and properties hand it their functions.
-    jaxtyping.jaxtyped = jaxtyping._decorator.jaxtyped = first_calls  # type: ignore[assignment]
+    mock.patch.object(jaxtyping, "jaxtyped", first_calls).start()  # by this name the hook decorates what is imported
     jaxtyping.install_import_hook(modules, None)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.export.layers import in_encoding
 from srbf.export.manifest import stem, with_layers
 from srbf.export.settings import PLAIN, Settings, Written, no_levels
+from srbf.stored_layers import layer_entries
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from srbf.asset import Asset, LayerEncoding
+from srbf.asset import Asset
 from srbf.errors import InputError
+from srbf.stored_layers import LayerEncoding
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,10 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
+from srbf.errors import InputError
 from srbf.light_domain import domain_of_asset
 from srbf.light_linking import refuse_linked
-from srbf.lights import Light, moved, refuse_profiles
+from srbf.lights import Light, PointLight, moved
 from srbf.methods.linked_objects import require_objects
 from srbf.methods.over_lights import finish
 from srbf.methods.protocol import FitRun, Method, Moving
@@ -92,7 +93,7 @@ def in_asset_frame(asset: Asset, lights: Sequence[Light]) -> list[Light]:
     True
     """
     if not method_of(asset).takes_profiles:
-        refuse_profiles(lights, asset.method)
+        _refuse_profiles(lights, asset.method)
     if method_of(asset).takes_links:
         require_objects(asset, lights)
     else:
@@ -340,3 +341,11 @@ def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
     covered = None if positions is None else positions[asset.covered]
     fit = asset.manifest.get("source", {}).get("fit", {})
     return domain.outside(in_asset_frame(asset, lights), covered, fit)
+
+
+def _refuse_profiles(lights: Sequence[Light], method: str) -> None:
+    """InputError where one of the lights has a profile, of an asset whose method takes none."""
+    if any(isinstance(light, PointLight) and light.profile is not None for light in lights):
+        raise InputError(
+            f"expected lights without a profile for a {method} asset, found one; capture the scene with `light_set=surfels` or `gather`"
+        )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.encode.clustered_components import ClusteredComponents
@@ -24,6 +24,7 @@ from srbf.errors import ManifestError
 from srbf.io.image import Encoding
 from srbf.methods.over_lights import row_chunks
 from srbf.methods.protocol import MOST_POINT_LIGHTS, Method, ShaderParts
+from srbf.stored_layers import layer_entries
 
 if TYPE_CHECKING:
     from srbf.gl.passes import Passes

@@ -11,7 +11,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.channels import GLOSS, THROUGH
@@ -32,6 +32,7 @@ from srbf.methods.mixed_clusters import (
     size,
 )
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
+from srbf.stored_layers import layer_entries
 from srbf.visibility.gather_operator import GatherOperator
 from srbf.visibility.linked_light import LinkedLight, surfel_objects
 from srbf.visibility.near_cells import NearCells

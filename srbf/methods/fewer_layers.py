@@ -8,11 +8,12 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float64
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.basis.gaussian import GaussianBasis, r_table, spread_of
 from srbf.encode.quantization import quantize, quantize_together
 from srbf.io.image import Encoding
 from srbf.sphere import all_around, point_set
+from srbf.stored_layers import layer_entries
 
 SPREADS = (0.8, 1.0, 1.25, 1.6, 2.0)  # of the mean distance between the new centers
 WIDEST = 1.0  # rad: past it the R table has a cusp

@@ -10,7 +10,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.channels import GLOSS, THROUGH
@@ -30,6 +30,7 @@ from srbf.methods.mixed_clusters import (
     size,
 )
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
+from srbf.stored_layers import layer_entries
 from srbf.visibility.gathered_samples import RAYS, GatheredSamples, light_on_clusters
 from srbf.visibility.received import occluders_of
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.encode.dilation import dilate, nearest_covered
@@ -23,6 +23,7 @@ from srbf.methods.carried import carried_images, carried_scene, common_manifest
 from srbf.methods.over_lights import row_chunks
 from srbf.methods.protocol import MOST_POINT_LIGHTS, QUIET, FitRun, Method, ShaderParts, setting
 from srbf.methods.seam_report import seam_report
+from srbf.stored_layers import layer_entries
 
 if TYPE_CHECKING:
     from srbf.gl.passes import Passes

@@ -10,7 +10,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of, weight, weight_curve
 from srbf.basis.harmonics import HARMONICS, HarmonicKind, PolynomialTextureMap, SphericalHarmonics
@@ -31,6 +31,7 @@ from srbf.methods.protocol import MOST_POINT_LIGHTS, QUIET, FitRun, Method, Shad
 from srbf.methods.seam_report import seam_report
 from srbf.solve.least_squares import StreamedLeastSquares
 from srbf.sphere import Domain, PointSet
+from srbf.stored_layers import layer_entries
 
 if TYPE_CHECKING:
     from srbf.gl.passes import Passes

@@ -11,7 +11,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import COVERED, Capture
 from srbf.encode.dilation import dilate, nearest_covered
@@ -24,6 +24,7 @@ from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HE
 from srbf.methods.light_table_maps import stored_values
 from srbf.methods.over_lights import row_chunks
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
+from srbf.stored_layers import layer_entries
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.patch_transfer import Exchange, PatchTransfer, example_light, patch_transfer, surfel_clusters, thinned
 from srbf.visibility.received import ReceivedLight

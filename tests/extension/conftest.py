@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.basis.gaussian import r_table
 from srbf.encode.quantization import quantize
 from srbf.sphere import point_set
+from srbf.stored_layers import layer_entries
 
 SCRIPT = Path(__file__).parent / "in_blender.py"
 

@@ -11,9 +11,9 @@ import numpy as np
 from closed_forms import quad
 from view_assets import scene_glb
 
-from srbf.asset import layer_entries
 from srbf.encode.quantization import quantize
 from srbf.io.image import write_image
+from srbf.stored_layers import layer_entries
 
 LOW, HIGH = np.array([-2.0, -1.5, 0.0]), np.array([2.0, 1.5, 2.5])  # of the room, m
 CELLS = 6  # per side of a wall

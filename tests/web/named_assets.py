@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from web_assets import FLOAT, HALF_EXTENT
 
-from srbf.asset import layer_entries
 from srbf.encode.quantization import quantize
 from srbf.io.image import write_image
+from srbf.stored_layers import layer_entries
 
 NAMES = ("Desk lamp", "Window", "TV", "L0", "Sconce & rail")
 SCALE = 2.0**-9  # of stored light values

@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from made_assets import build_neural
-from web_assets import FLOAT, HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
+from web_assets import ALBEDO, FLOAT, HALF_EXTENT, LIGHTS, PLACE, complete, on_a_plane, tolerance
 
 from srbf.asset import Asset
 from srbf.methods import linear_response, relight
 
-ALBEDO = (0.8, 0.5, 0.3)
-PLACE = 2e-5  # of a texel: how far single precision may put a pixel off its middle
 BRIGHTEST = 30.0  # Babylon.js clamps what a PBR material hands to post-processes
 
 
@@ -38,26 +36,8 @@ def test_eigen_maps_and_radiance_work_too(browser: Any, make_planes: Callable[..
     assert (np.abs(shown - expected) <= tolerance(asset, LIGHTS["several"])).all()
 
 
-@pytest.mark.parametrize("filtering", ["nearest", "linear"])
-@pytest.mark.parametrize(
-    ("method", "kind"), [("clustered-eigen-map", "directional"), ("clustered-eigen-map", "several"), ("neural-map", "several")]
-)
-def test_layers_without_a_mean_are_relit_texel_by_texel(
-    browser: Any, make_planes: Callable[..., Asset], method: str, kind: str, filtering: str
-) -> None:
-    """Each texel by its own functions or code; filtered, the light of four texels is mixed, which in a texel's middle is its own."""
-    made = build_neural() if method == "neural-map" else make_planes(components=5, clusters=7, encoding="half", ambient=True)
-    asset = complete(on_a_plane(made))
-    job = {"asset": browser.serve(asset), "lights": LIGHTS[kind], "color": ALBEDO, "half": HALF_EXTENT, "filter": filtering}
-    shown = browser.picture("babylon-material", **job) * np.pi / ALBEDO
-    allowed = tolerance(asset, LIGHTS[kind])
-    if filtering == "linear":
-        allowed = allowed + PLACE * allowed.max() / FLOAT
-    assert (np.abs(shown - relight(asset, LIGHTS[kind])) <= allowed).all()
-
-
 def test_a_neural_map_between_texels_is_the_mix_of_their_light(browser: Any) -> None:
-    """A quarter of a texel to the right and a half down, edges clamped."""
+    """0.25 texels to the right and 0.5 down, edges clamped."""
     asset = complete(on_a_plane(build_neural()))
     del asset.images["ambient"], asset.manifest["ambient"]
     right, down = 0.25, 0.5

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cloud_assets import GRID, LOW, Room, room, with_table, with_transfer
+from web_assets import ALBEDO
 
 CLOSE = 1e-6  # relative: single precision of cells on disk, the same in both
 POINT: dict[str, Any] = {
@@ -127,7 +128,6 @@ FOLLOWED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {**AREA, "color": tuple(0.18 * 5 * np.array([1, 0.9, 0.5]))},
     ),
 }
-ALBEDO = (0.8, 0.5, 0.3)
 
 
 @pytest.mark.parametrize("run", ["three-material", "nodes-material"])

@@ -7,14 +7,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from named_assets import NAMES, Mixed, light_mix, named_maps
-from web_assets import HALF_EXTENT
+from web_assets import ALBEDO, HALF_EXTENT
 
 MADE = {
     "clusters": lambda: light_mix(clusters=7),
     "one cluster": lambda: light_mix(clusters=None, components=9, encoding="uint8"),
     "maps": named_maps,
 }
-ALBEDO = (0.8, 0.5, 0.3)
 ENGINES = {
     "three maps": ("three-material", {"material": "MeshLambertMaterial", "source": "maps"}),
     "three lightmap": ("three-material", {"material": "MeshLambertMaterial", "source": "lightmap"}),

@@ -7,14 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_assets import build_neural
-from web_assets import FLOAT, HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
+from web_assets import ALBEDO, HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
 
 from srbf.asset import Asset
 from srbf.methods import relight
-
-ALBEDO = (0.8, 0.5, 0.3)
-PLACE = 2e-5  # of a texel: how far single precision may put a pixel off its middle
 
 
 @pytest.mark.parametrize("kind", ["directional", "point", "several"])
@@ -32,21 +28,3 @@ def test_eigen_maps_and_radiance_work_too(browser: Any, make_planes: Callable[..
     job = {"lights": LIGHTS["several"], "color": ALBEDO, "half": HALF_EXTENT}
     shown = browser.picture("playcanvas-material", asset=browser.serve(asset), **job)
     assert (np.abs(shown - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()
-
-
-@pytest.mark.parametrize("filtering", ["nearest", "linear"])
-@pytest.mark.parametrize(
-    ("method", "kind"), [("clustered-eigen-map", "directional"), ("clustered-eigen-map", "several"), ("neural-map", "several")]
-)
-def test_layers_without_a_mean_are_relit_texel_by_texel(
-    browser: Any, make_planes: Callable[..., Asset], method: str, kind: str, filtering: str
-) -> None:
-    """Each texel by its own functions or code; filtered, the light of four texels is mixed, which in a texel's middle is its own."""
-    made = build_neural() if method == "neural-map" else make_planes(components=5, clusters=7, encoding="half", ambient=True)
-    asset = complete(on_a_plane(made))
-    job = {"asset": browser.serve(asset), "lights": LIGHTS[kind], "color": ALBEDO, "half": HALF_EXTENT, "filter": filtering}
-    shown = browser.picture("playcanvas-material", **job) * np.pi / ALBEDO
-    allowed = tolerance(asset, LIGHTS[kind])
-    if filtering == "linear":
-        allowed = allowed + PLACE * allowed.max() / FLOAT
-    assert (np.abs(shown - relight(asset, LIGHTS[kind])) <= allowed).all()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_assets import build_neural
-from web_assets import FOLLOWED, HALF_EXTENT, LIGHTS, complete, decoded, on_a_plane, tolerance
+from web_assets import ALBEDO, FOLLOWED, HALF_EXTENT, LIGHTS, complete, decoded, on_a_plane, tolerance
 
 from srbf.asset import Asset
 from srbf.export import Settings, export
@@ -18,7 +18,6 @@ from srbf.methods import linear_response, relight
 
 ENCODINGS = ("float", "half", "uint8")
 METHODS = ("relighting-map", "eigen-map", "clustered-eigen-map", "neural-map")
-ALBEDO = (0.8, 0.5, 0.3)
 MATERIALS = ("MeshStandardMaterial", "MeshLambertMaterial", "MeshBasicMaterial")
 
 

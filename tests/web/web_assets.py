@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from srbf import methods
-from srbf.asset import Asset, layer_entries
+from srbf.asset import Asset
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
+from srbf.stored_layers import layer_entries
 
 FLOAT = 1e-4  # of the sum of the magnitudes of all terms; a few 1e-6 are usual
 HALF = 2 * 2.0**-10  # two steps of a half float
@@ -30,6 +31,8 @@ LIGHTS["several"] = [light for lights in LIGHTS.values() for light in lights] + 
     PointLight((-0.9, -0.7, 0.5), (0.3, 0.2, 0.8), falloff="inverse-square"),
 ]
 
+ALBEDO = (0.8, 0.5, 0.3)
+PLACE = 2e-5  # texels: how far single precision may put a pixel off its middle
 HALF_EXTENT = (1.4, 0.9, 0.25)  # of the rectangle that receivers of `on_a_plane` fill, and its height, meters
 
 # Lights as three.js, y up, has them, and as the library does.
