@@ -244,7 +244,7 @@ def relight(
             "--scene-lights or --ambient-only"
         )
     if turn and not environment:
-        raise typer.BadParameter("expected --environment with --turn, found none; add one, or put `turn` into FRAMES.json")
+        raise typer.BadParameter("expected --environment with --turn, found none; add one, or give the turn in FRAMES.json")
     if reference is not None and (lights is not None or at is not None or harmonics or not ambient):
         raise typer.BadParameter("expected --reference without --lights, --at, --harmonics and --no-ambient, found both; leave one out")
     for flag, value in (("--samples", samples), ("--blender", blender)):

@@ -78,8 +78,8 @@ class Measures:
         responses = asset_responses(asset, domain_of_asset(asset.manifest).probes(DIRECTIONS))[:, 0]  # (b, n, 3)
         own = singular_values(responses.transpose(1, 0, 2).reshape(len(self._texels), -1)) / np.sqrt(responses.size)
         captured = None
-        if self._capture is not None:
-            captured = spectrum(self._sample) / np.sqrt(len(self._texels) * 3 * len(self._sample.indices("train")))
+        if self._capture is not None and (train := self._capture.indices("train")):
+            captured = spectrum(self._sample) / np.sqrt(len(self._texels) * 3 * len(train))
         return {
             "scalars": method_of(asset).numbers_per_texel(asset),
             "asset": _listed(own),

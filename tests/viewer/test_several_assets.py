@@ -24,6 +24,7 @@ from srbf.methods import relight
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.viewer.contents import contents_of
+from srbf.viewer.measures import Measures
 from srbf.viewer.page_manifest import title
 
 PICTURE = f"#{{'zoom':{ZOOM},'middle':[7,5]"
@@ -91,6 +92,17 @@ def test_every_light_s_error_is_the_evaluation_s(chromium: Any, fitted: tuple[Ca
         colors[name] = chromium("run", script=script)
     assert colors["worst"][0] > colors["worst"][2] + 60
     assert colors["best"][2] > colors["best"][0] + 60
+
+
+def test_a_capture_of_held_out_lights_alone_has_no_spectrum(fitted: tuple[Capture, list[Path]]) -> None:
+    """As of surfels: it has no images that were fitted."""
+    capture, folders = fitted
+    path = capture.folder / "capture.json"
+    told = json.loads(path.read_text())
+    path.write_text(json.dumps({**told, "lights": [{**light, "role": "holdout"} for light in told["lights"]]}))
+    measured = json.loads(Measures([Asset.open(folders[0])], Capture.open(capture.folder)).spectrum(0))
+    assert measured["capture"] is None
+    assert len(measured["asset"]) > 15
 
 
 def test_a_spectrum_is_the_singular_values_of_the_responses(
