@@ -1,4 +1,4 @@
-"""A made view of a room whose camera is known, and meshes of things in a scene."""
+"""A made view of a room whose camera is known, meshes of things in a scene, and a deep framebuffer of some."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from closed_forms import TURN, flat_normals
+from made_rooms import Room
 from web_assets import complete
 
 from srbf.asset import Asset
@@ -54,3 +55,19 @@ def scene_glb(*things: tuple[str, np.ndarray, dict[str, Any]], uv: tuple[str, np
     root = document.add("nodes", {"rotation": TURN, "children": nodes})
     document.json.update(scenes=[{"nodes": [root]}], scene=0)
     return document.pack()
+
+
+def with_objects(asset: Asset, room: Room, wall: float) -> Asset:
+    """The asset, whose surfels and triangles are of the objects Gray, Red and Wall, at x = `wall` (m)."""
+
+    def numbers(x: np.ndarray) -> np.ndarray:
+        return np.where(np.abs(x - wall) < 1e-4, 2, np.where(x < 1e-4, 1, 0))
+
+    names = ["Gray", "Red", "Wall"]
+    pool = asset.tables["pool"].copy()
+    pool[2, :, 3] = numbers(pool[0, :, 0])
+    of = numbers(room.corners[:, :, 0].max(axis=1))
+    scene = scene_glb(*((name, room.corners[of == number], {"doubleSided": True}) for number, name in enumerate(names)))
+    manifest = {**asset.manifest, "gather": {**asset.manifest["gather"], "objects": names}}
+    tables = asset.tables | {"pool": pool, "view_links": asset.tables["view_links"].copy()}  # what is made ready goes by this table
+    return replace(asset, manifest=manifest, tables=tables, scene=scene)

@@ -1,13 +1,15 @@
 /** Lights brought into the asset's frame: the one place where the package does it. */
 import type { Asset } from "./asset";
 import { SrbfError } from "./errors";
+import { isLinked, type Links, linksOf } from "./light_linking";
 import { type AreaLight, type EnvironmentLight, isPunctual, type Light, moved, type NamedLight, type PunctualLight } from "./lights";
-import { lightDomainOf } from "./manifest";
+import { type LightDomain, lightDomainOf } from "./manifest";
 import type { Matrix4, Triple } from "./matrix";
+import type { GatherManifest } from "./gather";
 import { type EnvironmentDirections, environmentDirections } from "./environment_directions";
 
-/** A unit direction from the surface to the light, in the asset's frame, and its irradiance. */
-export type DistantLight = readonly [direction: Triple, color: Triple];
+/** A unit direction from the surface to the light, in the asset's frame, its irradiance, and what it chooses of the scene's objects. */
+export type DistantLight = readonly [direction: Triple, color: Triple, links?: Links];
 
 export interface LightsInAssetFrame {
   readonly distant: readonly DistantLight[];
@@ -41,9 +43,15 @@ export function inAssetFrame(asset: Pick<Asset, "manifest" | "assetFromWorld">, 
   if (domain === "directions" && lights.some((light) => isPunctual(light) && light.profile)) {
     throw new SrbfError("expected lights without a profile for this asset, found one; capture the scene with --light-set surfels or gather");
   }
+  checkLinks(manifest, domain, lights);
   const maps = lights.filter((light) => light.kind === "environment");
   return {
-    distant: lights.filter((light) => light.kind === "directional").map((light) => [moved(light, assetFromWorld).direction, light.color]),
+    distant: lights
+      .filter((light) => light.kind === "directional")
+      .map((light) => {
+        const { direction, color } = moved(light, assetFromWorld);
+        return isLinked(light) ? [direction, color, linksOf(light)] : [direction, color];
+      }),
     environments: domain === "pool" ? [] : maps,
     environmentDirections: domain === "pool" ? maps.map((light) => environmentDirections(light, assetFromWorld)) : [],
     assetFromWorld,
@@ -51,4 +59,11 @@ export function inAssetFrame(asset: Pick<Asset, "manifest" | "assetFromWorld">, 
     areas: lights.filter((light) => light.kind === "area").map((light) => moved(light, assetFromWorld)),
     named: lights.filter((light) => light.kind === "named"),
   };
+}
+
+/** @throws SrbfError where lights choose objects of an asset that does not know them. */
+function checkLinks(manifest: GatherManifest, domain: LightDomain, lights: readonly Light[]): void {
+  if (!lights.some((light) => isLinked(light as Links))) return;
+  if (domain !== "pool") throw new SrbfError("expected lights without receivers and blockers for this asset, found one with them; capture the view with --light-set gather");
+  if (!manifest.gather?.objects?.length) throw new SrbfError("expected an asset that knows its objects for a light with receivers or blockers, found one of an older bake; bake again, and fit");
 }

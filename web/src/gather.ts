@@ -3,6 +3,7 @@ import { SrbfError } from "./errors";
 import { decodeFloat } from "./exr";
 import type { AssetFiles } from "./files";
 import { type ByteImage, type FloatImage, padToFour } from "./image";
+import { LinkedObjects } from "./light_linking";
 import type { Manifest } from "./manifest";
 import { NearCells } from "./near_cells";
 import { NearPool } from "./near_sources";
@@ -13,7 +14,18 @@ import { readOccluders } from "./triangles";
 
 /** Keys of asset.json. */
 export interface GatherManifest extends Manifest {
-  gather?: { surfels: number; clusters: number; view_rays: number; exchange_rays: number; bounces?: number; lobes?: number; gloss_rays?: number; specular_albedo?: boolean };
+  gather?: {
+    surfels: number;
+    clusters: number;
+    view_rays: number;
+    exchange_rays: number;
+    bounces?: number;
+    lobes?: number;
+    gloss_rays?: number;
+    specular_albedo?: boolean;
+    /** Names of objects, of which the pool has each surfel's number. */
+    objects?: string[];
+  };
   pool?: { file: string };
   view_links?: { file: string };
   view_rows?: { file: string };
@@ -81,11 +93,11 @@ export function weightRows({ view, gloss }: Gather): [clusters: number, lobes: n
 
 /** @throws SrbfError on damaged files, and on links that do not fit the pool. */
 export async function readGather(files: AssetFiles, manifest: GatherManifest): Promise<Gather> {
-  const { surfels, clusters, view_rays, exchange_rays, bounces, lobes, gloss_rays, specular_albedo } = manifest.gather as Required<GatherManifest>["gather"];
+  const { surfels, clusters, view_rays, exchange_rays, bounces, lobes, gloss_rays, specular_albedo, objects: names } = manifest.gather as Required<GatherManifest>["gather"];
   const file = (manifest.pool as { file: string }).file;
   const scene = manifest.scene as string;
   const float = (name: string) => files.bytes(name).then((buffer) => decodeFloat(buffer, name));
-  const [pool, corners, view, exchange, near, gloss] = await Promise.all([
+  const [pool, triangles, view, exchange, near, gloss] = await Promise.all([
     float(file),
     files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
     readLinks(files, manifest, "view", clusters, view_rays, surfels),
@@ -99,15 +111,24 @@ export async function readGather(files: AssetFiles, manifest: GatherManifest): P
   for (let i = 0; i < surfels; ++i) first[4 * (surfels + i) + 3] = i;
   const colors = (row: number) => Float32Array.from({ length: 3 * surfels }, (_, i) => pool.data[4 * (row * surfels + Math.floor(i / 3)) + (i % 3)]);
   const albedo = colors(2);
+  const objects = names?.length ? new LinkedObjects({ names, objects: surfelObjects(pool, surfels, names.length, file) }, triangles) : undefined;
   const specular = specular_albedo ? colors(3) : undefined;
   const cells = new Cells({ kind: "float", width: surfels, height: 2, channels: 4, data: first }, file);
   const most = bounces ?? MOST_TERMS;
   const terms = Math.max(termsOf(exchange, albedo, most), Math.min(specular ? 1 : 0, most)); // lobes see what is not diffuse
-  return { surfels: { cells, corners, tables: [] }, albedo, exchange, view, gloss, specular, terms, near: near && terms ? nearPool(near) : undefined };
+  return { surfels: { cells, corners: triangles.corners, objects, tables: [] }, albedo, exchange, view, gloss, specular, terms, near: near && terms ? nearPool(near) : undefined };
 
   function nearPool([points, labels, places]: FloatImage[]): NearPool {
     return new NearPool(cells, new NearCells(labels, places, surfels, "near_labels"), albedo, points, clusters, "view_points");
   }
+}
+
+/** @throws SrbfError where a number has no name. */
+function surfelObjects({ data }: FloatImage, surfels: number, count: number, where: string): Int32Array {
+  const objects = Int32Array.from({ length: surfels }, (_, i) => Math.round(data[4 * (2 * surfels + i) + 3]));
+  const other = objects.find((object) => !(object >= 0 && object < count));
+  if (other !== undefined) throw new SrbfError(`expected objects 0 to ${count - 1} in ${where}, found ${other}; fit again`);
+  return objects;
 }
 
 /** What the clusters and, from the next row of ACROSS on, the lobes receive from surfels of a direct irradiance (S, 3), all bounces included. */

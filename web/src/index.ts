@@ -4,6 +4,7 @@ export { SrbfError } from "./errors";
 export type { ByteImage, FloatImage, HalfImage } from "./image";
 export { type PointLightUniforms, pointLightRoom, pointLightUniforms, packedPointLights, versine } from "./point_light";
 export type { LayerStack } from "./layers";
+export type { Links, Objects } from "./light_linking";
 export { Profile } from "./light_profile";
 export {
   type AreaLight,

@@ -3,6 +3,7 @@
  * z up. The arithmetic is that of `srbf/lights.py`, in double precision.
  */
 import { SrbfError } from "./errors";
+import type { Links } from "./light_linking";
 import { type Profile, profileAxes, rollOf } from "./light_profile";
 import { carried, cross, determinant, type Matrix4, type Triple, turned } from "./matrix";
 
@@ -10,7 +11,7 @@ export const DEFAULT_RADIUS = 1e-4; // meters: least distance to a receiver, so 
 const WHITE: Triple = [1, 1, 1];
 
 /** A light at infinity: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it. */
-export interface DirectionalLight {
+export interface DirectionalLight extends Links {
   readonly kind: "directional";
   readonly direction: Triple;
   readonly color: Triple;
@@ -19,7 +20,7 @@ export interface DirectionalLight {
 }
 
 /** A point light; `color` is its irradiance at the distance `a0` (m); |L| is never less than `radius` (m). */
-interface Punctual {
+interface Punctual extends Links {
   readonly position: Triple;
   readonly color: Triple;
   readonly a0: number;
@@ -58,7 +59,7 @@ export interface SphereLight extends Punctual {
  * A rectangle about `position` with the sides `u` and `v` (m) that shines towards u x v alone, evenly from every direction: `color` is the irradiance
  * on its axis at the distance `a0` (m), where that is far away; E = color a0^2 / A times the integral of cos cos / r^2 over its area A.
  */
-export interface AreaLight {
+export interface AreaLight extends Links {
   readonly kind: "area";
   readonly position: Triple;
   readonly u: Triple;
@@ -87,6 +88,9 @@ export interface NamedLight {
 export type Light = DirectionalLight | PointLight | SpotLight | SphereLight | AreaLight | EnvironmentLight | NamedLight;
 export type PunctualLight = PointLight | SpotLight | SphereLight;
 
+/** What may be left out of a light of a place. Links are given to any light as `{ ...light, receivers, blockers }`. */
+type Options = Partial<Omit<Punctual, "position" | keyof Links>>;
+
 /** @throws SrbfError on a direction of no length, and an angle outside [0, pi). */
 export function directionalLight(direction: Triple, color: Triple = WHITE, angle?: number): DirectionalLight {
   if (angle !== undefined && !(0 <= angle && angle < Math.PI)) throw new SrbfError(`expected an angle of 0 to pi rad, found ${angle}`);
@@ -94,7 +98,7 @@ export function directionalLight(direction: Triple, color: Triple = WHITE, angle
 }
 
 /** @throws SrbfError on numbers that are not finite, or a0 or radius not above 0. */
-export function pointLight(position: Triple, options: Partial<Omit<Punctual, "position">> = {}): PointLight {
+export function pointLight(position: Triple, options: Options = {}): PointLight {
   refuseProjected(options);
   return { kind: "point", ...punctual(position, options) };
 }
@@ -104,7 +108,7 @@ export function spotLight(
   position: Triple,
   direction: Triple,
   cone: { inner: number; outer: number },
-  options: Partial<Omit<Punctual, "position">> & { size?: number } = {},
+  options: Options & { size?: number } = {},
 ): SpotLight {
   const { inner, outer } = cone;
   if (!(0 <= inner && inner <= outer && outer <= Math.PI)) {
@@ -118,7 +122,7 @@ export function spotLight(
 }
 
 /** Inverse-square unless `falloff` says otherwise; inside the sphere as strong as on its surface. @throws SrbfError as `pointLight`, and on a size not above 0. */
-export function sphereLight(position: Triple, size: number, options: Partial<Omit<Punctual, "position">> = {}): SphereLight {
+export function sphereLight(position: Triple, size: number, options: Options = {}): SphereLight {
   refuseProjected(options);
   if (!(size > 0 && Number.isFinite(size))) throw new SrbfError(`expected size above 0, found ${size}`);
   const own = punctual(position, { falloff: "inverse-square", ...options });
@@ -182,7 +186,7 @@ export function unit(v: Triple): Triple {
   return [scaled[0] / length, scaled[1] / length, scaled[2] / length];
 }
 
-function punctual(position: Triple, options: Partial<Omit<Punctual, "position">>): Punctual {
+function punctual(position: Triple, options: Options): Punctual {
   const { color = WHITE, a0 = 1, falloff = "linear", radius = DEFAULT_RADIUS } = options;
   for (const [name, value] of Object.entries({ a0, radius })) {
     if (!(Number.isFinite(value) && value > 0)) throw new SrbfError(`expected ${name} above 0, found ${value}`);

@@ -1,4 +1,5 @@
-/** Whether something stands between two places: rays against triangles in a hierarchy of boxes, on the CPU. */
+/** Whether something stands between two places, and what is nearest to one: triangles in a hierarchy of boxes, on the CPU. */
+import { squaredDistance } from "./nearest_triangle";
 
 const LEAF = 4; // triangles
 const DEEPEST = 64;
@@ -12,6 +13,8 @@ export class Occluders {
   private readonly counts: Int32Array;
   /** Of each triangle in the order of the leaves, nine numbers: a corner and the two edges from it. */
   private readonly triangles: Float64Array;
+  /** The numbers that these have among `corners`. */
+  private readonly order: Uint32Array;
   private readonly stack = new Int32Array(DEEPEST);
   private used = 0;
 
@@ -22,7 +25,7 @@ export class Occluders {
     this.boxes = new Float64Array(6 * nodes);
     this.next = new Int32Array(nodes);
     this.counts = new Int32Array(nodes);
-    const order = Uint32Array.from({ length: count }, (_, i) => i);
+    const order = (this.order = Uint32Array.from({ length: count }, (_, i) => i));
     if (count > 0) this.build(new Spread(corners), order, 0, count);
     this.triangles = new Float64Array(9 * count);
     order.forEach((from, to) => {
@@ -73,6 +76,36 @@ export class Occluders {
       for (let i = next[node]; i < next[node] + counts[node]; ++i) if (this.meets(9 * i, x, y, z, dx, dy, dz)) return true;
     }
     return false;
+  }
+
+  /** The number of the triangle that is nearest to a place, of several any; -1 of none. */
+  nearest(x: number, y: number, z: number): number {
+    if (this.used === 0) return -1;
+    const { boxes, next, counts, stack, order, triangles } = this;
+    const apart = (node: number): number => {
+      const b = 6 * node;
+      const dx = Math.max(boxes[b] - x, x - boxes[b + 3], 0);
+      const dy = Math.max(boxes[b + 1] - y, y - boxes[b + 4], 0);
+      const dz = Math.max(boxes[b + 2] - z, z - boxes[b + 5], 0);
+      return dx * dx + dy * dy + dz * dz;
+    };
+    let [found, least, top] = [-1, Infinity, 0];
+    stack[top++] = 0;
+    while (top > 0) {
+      const node = stack[--top];
+      if (apart(node) >= least) continue;
+      if (counts[node] === 0) {
+        const nearerFirst = apart(node + 1) < apart(next[node]);
+        stack[top++] = nearerFirst ? next[node] : node + 1;
+        stack[top++] = nearerFirst ? node + 1 : next[node];
+        continue;
+      }
+      for (let i = next[node]; i < next[node] + counts[node]; ++i) {
+        const squared = squaredDistance(triangles, 9 * i, x, y, z);
+        if (squared < least) [least, found] = [squared, i];
+      }
+    }
+    return order[found] ?? -1;
   }
 
   /** [Moeller1997], both sides. */

@@ -1,5 +1,6 @@
 /** What passes of a GPU need to compute the weights of lights inside a scene: cells of its surfaces, what casts shadows, and the tables from irradiance to weights. */
 import type { LightsInAssetFrame } from "./asset_frame";
+import { type LinkedObjects, type Links, isLinked, linksOf } from "./light_linking";
 import type { LightValues } from "./light_values";
 import { type AreaLight, type DirectionalLight, type PunctualLight, unit } from "./lights";
 import { cross, type Triple } from "./matrix";
@@ -11,6 +12,8 @@ export interface Surfels {
   readonly cells: Cells;
   /** Corners of the triangles that cast shadows, nine numbers each, meters. */
   readonly corners: Float32Array;
+  /** Of which objects surfels and triangles are, where lights may choose. */
+  readonly objects?: LinkedObjects;
   /** What the mean irradiance on the cells' patches is multiplied by, (patches, 3), before the tables; undefined: by nothing. */
   readonly reflectance?: Float64Array;
   /** Tables from there to the weights of the light functions, one after the other; of a transfer asset the last one takes weights of shapes. */
@@ -90,6 +93,8 @@ export interface Look {
   readonly factor?: Triple;
   /** A profile about `axis`. */
   readonly shape?: ProfileLook;
+  /** What its light chooses of the scene's objects, if it does. */
+  readonly links?: Links;
 }
 
 export type Placed = PunctualLight | AreaLight | DirectionalLight | EnvironmentDirections;
@@ -97,7 +102,8 @@ export type Placed = PunctualLight | AreaLight | DirectionalLight | EnvironmentD
 /** The looks of a light in the asset's frame: one, a grid of points of an area, or directions of an environment. */
 export function looksOf(light: Placed, middle: Triple): Look[] {
   const away = (p: Triple): Triple => [p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]];
-  const plain = { distant: false, axis: [0, 0, 1] as Triple, a0: 1, radius: 1e-4, falloff: "inverse-square", lambertian: false } as const;
+  const chosen = light.kind !== "environment-directions" && isLinked(light) ? { links: linksOf(light) } : {};
+  const plain = { ...chosen, distant: false, axis: [0, 0, 1] as Triple, a0: 1, radius: 1e-4, falloff: "inverse-square", lambertian: false } as const;
   if (light.kind === "directional") return [{ ...plain, distant: true, place: light.direction, color: light.color }];
   if (light.kind === "environment-directions") return light.directions.map(([place, factor]) => ({ ...plain, distant: true, place, color: light.color, factor }));
   if (light.kind === "area") {
@@ -116,7 +122,7 @@ export function looksOf(light: Placed, middle: Triple): Look[] {
 
 /** Lights that lay irradiance on cells. */
 export function placed({ punctual, areas, distant, environmentDirections }: LightsInAssetFrame): Placed[] {
-  const suns = distant.map(([direction, color]) => ({ kind: "directional", direction, color }) as const);
+  const suns = distant.map(([direction, color, links]) => ({ kind: "directional", direction, color, ...links }) as const);
   return [...punctual, ...areas, ...suns, ...environmentDirections];
 }
 

@@ -1,5 +1,6 @@
 /** The triangles of scene.glb that block light, in the asset's z-up frame: `srbf/io/scene_glb.py`, without a library for glTF. */
 import { SrbfError } from "./errors";
+import type { Numbered } from "./light_linking";
 import { carried, type Matrix4, multiplied, type Triple, Z_UP_FROM_Y_UP } from "./matrix";
 
 const MAGIC = 0x46546c67;
@@ -9,6 +10,7 @@ const READERS = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: 
 const COMPONENTS: Record<string, number> = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
 interface Node {
+  name?: string;
   mesh?: number;
   children?: number[];
   matrix?: number[];
@@ -36,13 +38,26 @@ interface Document {
   bufferViews: { byteOffset?: number; byteLength: number; byteStride?: number }[];
 }
 
-/** Corners of the opaque triangles that cast shadows, nine numbers each, meters. @throws SrbfError on anything but such a .glb. */
-export function readOccluders(data: ArrayBuffer, where: string): Float32Array {
+/** Opaque triangles that cast shadows, and the objects of the scene that they are of. */
+export interface OccludingTriangles extends Numbered {
+  /** Nine numbers each, meters. */
+  readonly corners: Float32Array;
+}
+
+/** What was found so far: corners, the object of every triangle, and all objects by their names. */
+interface Found {
+  readonly corners: number[];
+  readonly objects: number[];
+  readonly numbers: Map<string, number>;
+}
+
+/** @throws SrbfError on anything but such a .glb. */
+export function readOccluders(data: ArrayBuffer, where: string): OccludingTriangles {
   try {
     const { document, bytes } = parsed(data);
-    const found: number[] = [];
+    const found: Found = { corners: [], objects: [], numbers: new Map() };
     for (const root of document.scenes[document.scene ?? 0].nodes) visit(document, bytes, root, Z_UP_FROM_Y_UP, found);
-    return new Float32Array(found);
+    return { corners: new Float32Array(found.corners), objects: new Int32Array(found.objects), names: [...found.numbers.keys()] };
   } catch (error) {
     throw new SrbfError(`expected triangles as binary glTF 2.0 in ${where}, found ${error instanceof Error ? error.message : String(error)}; bake again`);
   }
@@ -56,9 +71,11 @@ function parsed(data: ArrayBuffer): { document: Document; bytes: ArrayBuffer } {
   return { document, bytes: data.slice(Math.min(20 + length + 8, data.byteLength)) };
 }
 
-function visit(document: Document, bytes: ArrayBuffer, index: number, parent: Matrix4, found: number[]): void {
+function visit(document: Document, bytes: ArrayBuffer, index: number, parent: Matrix4, found: Found): void {
   const node = document.nodes[index];
   const matrix = multiplied(parent, local(node));
+  const own = node.name ?? "";
+  if (node.mesh !== undefined && !found.numbers.has(own)) found.numbers.set(own, found.numbers.size);
   if (node.mesh !== undefined && node.extras?.casts_shadow !== false) {
     for (const { attributes, indices, material, mode = TRIANGLES } of document.meshes[node.mesh].primitives) {
       if (mode !== TRIANGLES || transmits(document.materials?.[material ?? -1])) continue;
@@ -68,7 +85,8 @@ function visit(document: Document, bytes: ArrayBuffer, index: number, parent: Ma
       for (let at = 0; at < (corners?.length ?? count); ++at) {
         const i = corners?.[at] ?? at;
         if (i >= count) throw new Error("a corner that does not exist");
-        found.push(...carried(matrix, [points[3 * i], points[3 * i + 1], points[3 * i + 2]] as Triple));
+        found.corners.push(...carried(matrix, [points[3 * i], points[3 * i + 1], points[3 * i + 2]] as Triple));
+        if (at % 3 === 2) found.objects.push(found.numbers.get(own) as number);
       }
     }
   }

@@ -18,6 +18,9 @@ export type AddedKind = Exclude<LightState["kind"], "named">;
 /** Whether lights shine inside the scene. */
 export const inside = ({ manifest }: Asset): boolean => ["cloud", "surfels", "pool"].includes(lightDomainOf(manifest));
 
+/** Objects by whose names its lights may choose what they shine on; none where the bake kept none. */
+export const linkableOf = ({ tables }: Asset): readonly string[] => tables.gather?.surfels.objects?.names ?? [];
+
 /** Kinds of lights that one can add. */
 export function kindsOf(asset: Asset): readonly AddedKind[] {
   if (asset.tables.gather) return ["point", "spot", "sphere", "area", "directional", "environment"];
@@ -35,6 +38,7 @@ export function assetFacts({ asset, maps, hasDirect, sunAngle, profiles }: Subje
     sunAngle,
     profiles,
     designed: (asset.manifest.scene_lights ?? []).length > 0,
+    linkable: linkableOf(asset),
     hasDisc: lightDomainOf(asset.manifest) === "directions",
     ...surfaceFacts(asset),
   };
@@ -57,14 +61,15 @@ export function exactColor(light: LightState, designed: Designed): Triple {
 }
 
 /** What the page does not show of the scene's lights and of `lights`, in one line; empty where it shows all of them. */
-export function missingLine({ asset: { manifest }, profiles }: Subject, lights: readonly LightState[]): string {
+export function missingLine({ asset, profiles }: Subject, lights: readonly LightState[]): string {
+  const { manifest } = asset;
   const shapes = lights.flatMap((light) => ("profile" in light && light.profile !== undefined && !profiles.has(light.profile) ? [light.profile] : []));
   const beyond = (manifest.scene_lights ?? []).slice(MOST_LIGHTS).map(({ name }) => name);
-  const linked = (manifest.scene_lights ?? []).flatMap(({ name, light }) => (light.receivers ?? light.blockers ? [name] : []));
+  const linked = linkableOf(asset).length ? [] : lights.flatMap(({ links, name, kind }) => (links ? [name ?? `a ${kind} one`] : []));
   const left = (manifest.scene_lights_left_out ?? []).map(({ name }) => name);
   return [
     beyond.length ? `lights past ${MOST_LIGHTS}: ${beyond.join(", ")}` : "",
-    linked.length ? `light linking not shown: ${linked.join(", ")}` : "",
+    linked.length ? `lights shine without their links to objects: ${linked.join(", ")}` : "",
     left.length ? `lights left out: ${left.join(", ")}` : "",
     shapes.length ? `lights shine without ${[...new Set(shapes)].join(", ")}: give srbf view these files by --profile` : "",
   ]

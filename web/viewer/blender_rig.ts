@@ -1,5 +1,6 @@
 /** The page's lights as a Python script that makes them in Blender. Units as in `blender_bake/light.py`. */
-import type { Triple } from "../src";
+import type { Links, Triple } from "../src";
+import { linksOf } from "../src/light_linking";
 import { profileAxes } from "../src/light_profile";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
@@ -17,7 +18,7 @@ export function blenderRig(lights: readonly LightState[], sunAngle = 0, designed
   const told = lights.flatMap((light, i) => {
     if (light.kind === "environment" || light.kind === "named") return [];
     const name = light.name ?? `srbf ${light.kind} ${i + 1}`;
-    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], profile: ownProfile(light, designed), ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), ...placed(light) }];
+    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], profile: ownProfile(light, designed), ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), links: changedLinks(light, designed), ...placed(light) }];
   });
   const kept = new Set(lights.map(({ name }) => name));
   const removed = designed.flatMap(({ name }) => (kept.has(name) ? [] : [name]));
@@ -94,6 +95,28 @@ def fill(light, told, settings):
         place.translation = light.matrix_world.translation
     light.matrix_world = place
     light.hide_render = light.hide_viewport = told["hidden"]
+    if told["links"] is not None:
+        for kind, place in (("receivers", "receiver_collection"), ("blockers", "blocker_collection")):
+            choice = told["links"].get(kind)
+            setattr(light.light_linking, place, chosen(f"srbf {light.name} {kind}", choice) if choice else None)
+
+
+def chosen(name, choice):
+    """The collection of what a light shines on, or of what shadows it."""
+    old = bpy.data.collections.get(name)
+    if old is not None:
+        bpy.data.collections.remove(old)
+    made = bpy.data.collections.new(name)
+    states = dict.fromkeys(choice.get("only", ()), "INCLUDE") | dict.fromkeys(choice.get("without", ()), "EXCLUDE")
+    objects = bpy.context.scene.objects
+    for one in states:
+        if one in objects:
+            made.objects.link(objects[one])
+    for member, one in zip(made.collection_objects, made.objects):
+        member.light_linking.link_state = states[one.name]
+    if "only" in choice and not any(states[one.name] == "INCLUDE" for one in made.objects):
+        made.objects.link(bpy.data.objects.new("srbf nothing", None))  # a collection without any chooses all
+    return made
 
 
 for name in REMOVED:
@@ -126,6 +149,12 @@ function wattsOf(light: LightState): number {
 function colored(color: Triple, watts: number): { energy: number; color: Triple } {
   const most = Math.max(...color, 1e-30);
   return { energy: watts * Math.max(...color), color: color.map((x) => x / most) as unknown as Triple };
+}
+
+/** What a light chooses of objects; null where Blender has that already. */
+function changedLinks({ name, links = {} }: LightState, designed: Designed): Links | null {
+  const own = linksOf((designed.find((one) => one.name === name)?.light ?? {}) as Links);
+  return JSON.stringify(own) === JSON.stringify(linksOf(links)) ? null : linksOf(links);
 }
 
 /** The profile that a light of the scene has there and still has; null of others, since the script has no files. */

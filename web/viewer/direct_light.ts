@@ -2,6 +2,7 @@
 import { Color, type DataTexture, FloatType, type Object3D, RGBAFormat, SphereGeometry, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import { type Asset, type FloatImage, type Light, moved, SrbfError, type Triple } from "../src";
 import { type DirectReceivers, directReceivers, fineReceivers } from "./direct_points";
+import { LinkedPixels } from "./linked_pixels";
 import { PointShadows } from "./point_shadows";
 import { shadowCasters } from "./shadow_casters";
 import { clear, floatTexture, type LitTexels, renderTarget } from "./shadow_maps";
@@ -55,7 +56,7 @@ export class DirectLight {
     const receivers = factor > 1 ? fineReceivers(asset, position, normal, coverage, factor) : directReceivers(asset, position, normal, coverage, direct?.footprint ?? 1);
     const surface = { width: factor * width, height: factor * height, reflectance: reflectance(asset, inputs.albedo, factor) };
     const further = factor > 1 ? {} : { gloss: inputs.gloss, through: inputs.through && reflectance(asset, inputs.through, 1) };
-    return new DirectLight(asset, receivers, { ...surface, ...further }, scene, renderer);
+    return new DirectLight(asset, receivers, { ...surface, ...further }, scene, renderer, factor > 1 ? undefined : new LinkedPixels(scene, position, receivers.center));
   }
 
   /** Of `width` x `height` white points that move, in the frame of `asset`: put them somewhere first. @throws as `ofAsset`. */
@@ -71,6 +72,7 @@ export class DirectLight {
     surface: Surface,
     scene: Object3D,
     private readonly renderer: WebGLRenderer,
+    private readonly linked?: LinkedPixels,
   ) {
     checkBlending(renderer);
     const { width, height } = surface;
@@ -128,8 +130,9 @@ export class DirectLight {
     clear(renderer, this.sum, 0);
     for (const light of shining) {
       const own = moved(light, this.asset.assetFromWorld);
-      if (own.kind === "directional") this.suns().add(this.sum, own);
-      else this.points().add(this.sum, own);
+      const choice = this.linked?.choice(own) ?? {};
+      if (own.kind === "directional") this.suns().add(this.sum, own, choice);
+      else this.points().add(this.sum, own, choice);
     }
     renderer.setRenderTarget(null);
     renderer.setClearColor(kept.color, kept.alpha);

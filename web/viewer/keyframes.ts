@@ -1,8 +1,9 @@
 /** FRAMES.json played by the page: the lights of one frame after the other, as `srbf relight --lights` reads them. */
 import { DEFAULT_RADIUS, unit } from "../src/lights";
 import { cross, dot } from "../src/matrix";
-import { SrbfError, type Triple } from "../src";
-import { KEPT_KEYS, levelSides, type LightState, round, rounded } from "./light_state";
+import { type Links, SrbfError, type Triple } from "../src";
+import { isLinked, linksOf } from "../src/light_linking";
+import { areLinks, levelSides, type LightState, round, rounded } from "./light_state";
 import { MOST_LIGHTS, type State } from "./state";
 
 export const FRAMES_PER_SECOND = 24;
@@ -69,7 +70,7 @@ export class Keyframes {
       }
       return false;
     }
-    const others = frame.length !== lights.length || frame.some((light, i) => light.kind !== lights[i].kind || profileOf(light) !== profileOf(lights[i]));
+    const others = frame.length !== lights.length || frame.some((light, i) => light.kind !== lights[i].kind || profileOf(light) !== profileOf(lights[i]) || JSON.stringify(light.links) !== JSON.stringify(lights[i].links));
     if (others) lights.splice(0, lights.length, ...frame.map((light, i) => ({ ...structuredClone(light), solo: lights[i]?.solo })));
     else frame.forEach((light, i) => assignLight(lights[i], structuredClone(light)));
     this.state.selected = Math.min(this.state.selected, lights.length - 1);
@@ -112,8 +113,9 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
   const intensity = entry.kind === "named" ? number("intensity", 1) : 1;
   if (intensity < 0) bad("an intensity of 0 or more", intensity);
   const own = typeof entry.name === "string" && entry.kind !== "named" ? { name: entry.name } : {};
-  const kept = Object.fromEntries(KEPT_KEYS.flatMap((key) => (entry[key] === undefined ? [] : [[key, entry[key]]])));
-  const common = { on: true, ...own, ...(Object.keys(kept).length ? { kept } : {}), ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
+  const links = linksOf(entry as Links);
+  if (!areLinks(links)) bad("receivers and blockers as {only, without} of names", links);
+  const common = { on: true, ...own, ...(isLinked(links) ? { links } : {}), ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
   if (entry.kind === "named") return { kind: "named", ...common, name: typeof entry.name === "string" ? entry.name : bad("a name", entry.name) };
   if (entry.kind === "directional") return { kind: "directional", ...common, direction: rounded(triple("direction")), ...(entry.angle === undefined ? {} : { angle: degrees("angle") }) };
   if (entry.kind === "environment") return { kind: "environment", ...common, file: typeof entry.file === "string" ? entry.file : bad("a file", entry.file), ...(entry.turn === undefined ? {} : { turn: degrees("turn") }) };

@@ -1,5 +1,5 @@
 /** Lights as the page and its URL hold them: numbers are rounded when they are set, so that page, URL and FRAMES.json agree. */
-import { areaLight, directionalLight, type EnvironmentLight, environmentLight, type Light, namedLight, pointLight, type Profile, sphereLight, spotLight, SrbfError, type Triple } from "../src";
+import { areaLight, directionalLight, type EnvironmentLight, environmentLight, type Light, type Links, namedLight, pointLight, type Profile, sphereLight, spotLight, SrbfError, type Triple } from "../src";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
 import type { Environment } from "./environment_file";
@@ -16,8 +16,8 @@ interface Common {
   kelvin?: number;
   /** Which of the scene's lights it is. */
   name?: string;
-  /** What FRAMES.json has of it and the page does not show: which objects it lights and which shadow it. */
-  kept?: Record<string, unknown>;
+  /** Which objects it shines on, and which shadow it: all unless given. */
+  links?: Links;
 }
 
 interface PointLight extends Common {
@@ -177,7 +177,11 @@ export function linearColor(light: Common): Triple {
  * without it. @throws SrbfError on invalid numbers.
  */
 export function lightOf(state: LightState, environments: ReadonlyMap<string, Environment>, profiles: ReadonlyMap<string, Profile> = new Map()): Light | undefined {
-  if (!state.on) return undefined;
+  const light = state.on ? unlinked(state, environments, profiles) : undefined;
+  return light && light.kind !== "environment" && light.kind !== "named" ? { ...light, ...state.links } : light;
+}
+
+function unlinked(state: LightState, environments: ReadonlyMap<string, Environment>, profiles: ReadonlyMap<string, Profile>): Light | undefined {
   const color = linearColor(state);
   if (state.kind === "directional") return directionalLight(state.direction, color, state.angle === undefined ? undefined : (state.angle * Math.PI) / 180);
   if (state.kind === "environment") {
@@ -229,8 +233,13 @@ export function aim(light: SpotState | AreaState): Triple {
   return direction.some((x) => x !== 0) ? direction : [0, 0, -1];
 }
 
-/** Keys of FRAMES.json that the page hands on as they are. */
-export const KEPT_KEYS: readonly string[] = ["receivers", "blockers"];
+/** Whether a value of a file or an address is what lights choose of objects. */
+export function areLinks(value: unknown): value is Links {
+  const object = (one: unknown): one is Record<string, unknown> => typeof one === "object" && one !== null && !Array.isArray(one);
+  const names = (one: unknown) => Array.isArray(one) && one.every((name) => typeof name === "string" && name !== "");
+  const choice = (one: unknown) => object(one) && Object.entries(one).every(([key, own]) => ["only", "without"].includes(key) && names(own));
+  return object(value) && Object.entries(value).every(([key, own]) => ["receivers", "blockers"].includes(key) && choice(own));
+}
 
 /** `value` as a light's state. @throws SrbfError on anything else. */
 export function checkLight(value: unknown): LightState {
@@ -248,7 +257,7 @@ export function checkLight(value: unknown): LightState {
   if (!Number.isFinite(light.intensity)) bad("a number of intensity");
   if (light.solo !== undefined && typeof light.solo !== "boolean") bad("true or false of solo");
   if (light.name !== undefined && (typeof light.name !== "string" || light.name === "")) bad("a text of name");
-  if (light.kept !== undefined && (typeof light.kept !== "object" || light.kept === null || Object.keys(light.kept).some((key) => !KEPT_KEYS.includes(key)))) bad(`${KEPT_KEYS.join(", ")} of kept`);
+  if (light.links !== undefined && !areLinks(light.links)) bad("receivers and blockers, {only, without} of names, of links");
   if (light.kelvin !== undefined && !((light.kelvin as number) > 0)) bad("a number above 0 of kelvin");
   if (light.kind === "directional") {
     triple("direction");

@@ -5,6 +5,7 @@ import { areaState, type DirectionalState, directionalState, type EnvironmentSta
 import type { AddedKind } from "./asset_lights";
 import type { Box } from "./ball_state";
 import type { Bounds } from "./receivers";
+import { linkControls } from "./link_controls";
 import { Mixer } from "./mixer";
 import { type Changed, COMPARES, firstPath, MOST_LIGHTS, PATHS, SHOWS, type State, TERMS, TONES, VIEWS } from "./state";
 import { surfaceControls } from "./surface_controls";
@@ -55,6 +56,8 @@ export interface PanelFacts {
   designed: boolean;
   /** Renders by Cycles, where the page may ask for them, and whether one can be compared with. */
   cycles?: { samples: number; rendering: boolean };
+  /** Objects that lights may choose. */
+  linkable: readonly string[];
   /** Whether a disc shows where directional lights are. */
   hasDisc: boolean;
   /** Objects that can emit, and whether they can be repainted. */
@@ -207,6 +210,7 @@ export class Panel {
       if (!this.facts.hasDisc) this.turned(folder, light);
       if (this.facts.hasDirect) this.angle(folder, light);
     }
+    if (light.kind !== "environment" && this.facts.linkable.length) linkControls(folder.$children, light, this.facts.linkable, this.relight);
     const remove = {
       remove: () => {
         this.state.lights.splice(this.state.selected, 1);

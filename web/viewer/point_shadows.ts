@@ -13,6 +13,7 @@ import { floatTexture } from "../src/three/float_textures";
 import { ProfileTextures } from "../src/three/profile_textures";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
+import type { LightChoice } from "./linked_pixels";
 import type { Caster } from "./shadow_casters";
 import { type LitTexels, ShadowMaps } from "./shadow_maps";
 import { across } from "./sun_disc";
@@ -57,6 +58,7 @@ export class PointShadows {
   private readonly profiles = new ProfileTextures();
   private readonly fine: ShadowMaps;
   private readonly coarse: ShadowMaps;
+  private choice: LightChoice = {};
 
   /** Lights and casters are relative to `center`, in the asset's frame. */
   constructor(
@@ -72,8 +74,9 @@ export class PointShadows {
   }
 
   /** Add the light of `light`, in the asset's frame, to `sum`. */
-  add(sum: WebGLRenderTarget, light: PunctualLight | AreaLight): void {
+  add(sum: WebGLRenderTarget, light: PunctualLight | AreaLight, choice: LightChoice): void {
     const { uniforms } = this;
+    this.choice = choice;
     const shape = light.kind === "area" ? undefined : profileLook(light);
     uniforms.profiled.value = shape !== undefined;
     if (shape) for (const [name, value] of Object.entries(this.profiles.uniforms(shape))) uniforms[name as "profile"].value = value as never;
@@ -109,14 +112,14 @@ export class PointShadows {
   private cube(sum: WebGLRenderTarget, light: PunctualLight, size: number, lambertian = 0): void {
     FACES.forEach((axes, face) => {
       this.look(light, axes, size / (size - 2 * GUARD), face, lambertian);
-      (size === FINE ? this.fine : this.coarse).add(sum, light.color);
+      (size === FINE ? this.fine : this.coarse).add(sum, light.color, this.choice);
     });
   }
 
   private cone(sum: WebGLRenderTarget, light: SpotLight, size: number): void {
     const right = across(light.direction);
     this.look(light, [right, cross(light.direction, right), light.direction], (Math.tan(light.outer) * size) / (size - 2 * GUARD), -1, 0);
-    (size === FINE ? this.fine : this.coarse).add(sum, light.color);
+    (size === FINE ? this.fine : this.coarse).add(sum, light.color, this.choice);
   }
 
   private look(light: PunctualLight, [right, up, ahead]: readonly [Triple, Triple, Triple], reach: number, face: number, lambertian: number): void {

@@ -35,7 +35,7 @@ export function frameOf(lights: readonly LightState[], designed: Designed = []):
 
 /** A light as srbf/schemas/frames.schema.json has it; an environment's file must lie beside FRAMES.json. */
 function entry(light: LightState, designed: Designed): Record<string, unknown> {
-  return { ...values(light, exactColor(light, designed)), ...light.kept, ...(light.name === undefined ? {} : { name: light.name }) };
+  return { ...values(light, exactColor(light, designed)), ...light.links, ...(light.name === undefined ? {} : { name: light.name }) };
 }
 
 function values(light: LightState, color: Triple): Record<string, unknown> {

@@ -8,6 +8,8 @@ const KNOTS = 8; // of a transmittance by cosine
 /** Triangles with attributes `corner` and `cornerNormal`; `curve` of a translucent one, its transmittance at eight cosines. */
 export interface Caster {
   geometry: BufferGeometry;
+  /** Of its object in the scene; what has none shadows every light. */
+  name?: string;
   curve?: Vector4[];
 }
 
@@ -17,13 +19,19 @@ export function shadowCasters(scene: Object3D, center: Triple): Caster[] {
   const found: Caster[] = [];
   scene.traverse((object) => {
     const mesh = object as Mesh<BufferGeometry, Material>;
-    if (mesh.isMesh && casts(mesh)) found.push({ geometry: geometryOf(mesh, center), curve: transmittanceOf(mesh.material) });
+    if (mesh.isMesh && casts(mesh)) found.push({ geometry: geometryOf(mesh, center), name: objectName(mesh), curve: transmittanceOf(mesh.material) });
   });
   return found;
 }
 
+/** The name of an object as the file has it: three changes names of nodes. */
+export function objectName(object: Object3D): string {
+  for (let at: Object3D | null = object; at; at = at.parent) if (typeof at.userData.name === "string") return at.userData.name;
+  return "";
+}
+
 /** In the asset's frame, z up. */
-function geometryOf(mesh: Mesh, center: Triple): BufferGeometry {
+export function geometryOf(mesh: Mesh, center: Triple): BufferGeometry {
   const source = mesh.geometry;
   const position = source.getAttribute("position");
   const normal = source.getAttribute("normal");

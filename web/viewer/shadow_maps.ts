@@ -25,15 +25,20 @@ import {
   Scene,
   type TextureDataType,
   type TextureFilter,
+  UnsignedByteType,
   type WebGLRenderer,
   WebGLRenderTarget,
   ZeroFactor,
 } from "three";
 import fullscreenVertex from "../../glsl/stages/fullscreen.vert";
 import type { Triple } from "../src";
+import type { LightChoice } from "./linked_pixels";
 import type { Caster } from "./shadow_casters";
 
 export type Uniforms = Record<string, IUniform>;
+
+const EVERYWHERE = new DataTexture(new Uint8Array([255]), 1, 1, RedFormat, UnsignedByteType);
+EVERYWHERE.needsUpdate = true;
 
 /** Where light is looked up: points and normals of every texel, several of each, and what a texel makes of irradiance. */
 export interface LitTexels {
@@ -59,6 +64,8 @@ export class ShadowMaps {
   private readonly walls = new Scene();
   private readonly translucent = new Scene();
   private readonly camera = new Camera();
+  /** Meshes of what has a name, which a light may choose. */
+  private readonly named: { name: string; mesh: Mesh }[] = [];
   private readonly lookups: readonly { own: LitTexels; material: RawShaderMaterial; quad: Scene }[];
 
   /** `projection`: uniforms of all stages, set before every `add`; `nothing`: what a height map holds where there is nothing. */
@@ -76,12 +83,18 @@ export class ShadowMaps {
     this.transmittances = renderTarget(size, size, RGBAFormat, HalfFloatType, LinearFilter);
     const { vertex: vertexShader } = stages;
     const height = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, fragmentShader: stages.height, uniforms: projection, ...blending("max") });
-    for (const { geometry, curve } of casters) {
-      (curve ? this.walls : this.occluders).add(unculled(geometry, height));
+    const cast = (into: Scene, { geometry, name }: Caster, material: RawShaderMaterial) => {
+      const mesh = unculled(geometry, material);
+      into.add(mesh);
+      if (name !== undefined) this.named.push({ name, mesh });
+    };
+    for (const caster of casters) {
+      const { curve } = caster;
+      cast(curve ? this.walls : this.occluders, caster, height);
       if (!curve) continue;
       const uniforms = { ...projection, curve: { value: curve } };
       const passing = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, fragmentShader: stages.transmittance, uniforms, ...blending("multiply") });
-      this.translucent.add(unculled(geometry, passing));
+      cast(this.translucent, caster, passing);
     }
     const corner = new BufferGeometry();
     corner.setAttribute("corner", new BufferAttribute(new Float32Array([-1, -1, 3, -1, -1, 3]), 2));
@@ -100,6 +113,7 @@ export class ShadowMaps {
           wallHeights: { value: this.wallHeights.texture },
           transmittance: { value: this.transmittances.texture },
           reflectance: { value: own.reflectance },
+          lit: { value: EVERYWHERE },
           weight: { value: [0, 0, 0] },
           ...Object.fromEntries(Object.entries(own.lobes ?? {}).map(([name, value]) => [name, { value }])),
         },
@@ -111,9 +125,10 @@ export class ShadowMaps {
     });
   }
 
-  /** Draw the maps, and add the light of a light of `color` to `sum`. */
-  add(sum: WebGLRenderTarget, color: Triple): void {
+  /** Draw the maps, and add the light of a light of `color` to `sum`, as it chooses. */
+  add(sum: WebGLRenderTarget, color: Triple, { lit, casts }: LightChoice): void {
     const { renderer } = this;
+    for (const { name, mesh } of this.named) mesh.visible = casts?.(name) ?? true;
     clear(renderer, this.heights, this.nothing);
     renderer.render(this.occluders, this.camera);
     clear(renderer, this.wallHeights, this.nothing);
@@ -127,6 +142,7 @@ export class ShadowMaps {
     renderer.setRenderTarget(sum);
     for (const { own, material, quad } of this.lookups) {
       const { uniforms } = material;
+      uniforms.lit.value = lit ?? EVERYWHERE;
       uniforms.weight.value = color.map((value) => value / own.corners.length);
       for (const { points, normals } of own.corners) {
         uniforms.points.value = points;
@@ -153,10 +169,11 @@ export function floatTexture(data: Float32Array, width: number, height: number):
   return made;
 }
 
-/** The pack's stage with a light's color, and with each texel's response to irradiance. */
+/** The pack's stage with a light's color, with each texel's response to irradiance, and with nothing on texels that are not lit. */
 function colored(stage: string): string {
   return stage
-    .replace("uniform float weight;", "uniform vec3 weight;\nuniform sampler2D reflectance;")
+    .replace("void main() {\n    ivec2 at = ivec2(gl_FragCoord.xy);", "$&\n    if (texelFetch(lit, min(at, textureSize(lit, 0) - 1), 0).r == 0.0) discard;")
+    .replace("uniform float weight;", "uniform vec3 weight;\nuniform sampler2D reflectance;\nuniform sampler2D lit;")
     .replace(/ \* weight,/, " * weight * texelFetch(reflectance, at, 0).rgb,");
 }
 

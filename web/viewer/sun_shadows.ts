@@ -6,6 +6,7 @@ import heightFragment from "../../glsl/stages/shadow_height.frag";
 import transmittanceFragment from "../../glsl/stages/shadow_transmittance.frag";
 import type { DirectionalLight, Triple } from "../src";
 import { cross, dot } from "../src/matrix";
+import type { LightChoice } from "./linked_pixels";
 import type { Caster } from "./shadow_casters";
 import { type LitTexels, ShadowMaps } from "./shadow_maps";
 import { across, discDirections } from "./sun_disc";
@@ -30,11 +31,11 @@ export class SunShadows {
   }
 
   /** Add the light of `sun`, in the asset's frame, to `sum`. */
-  add(sum: WebGLRenderTarget, sun: DirectionalLight): void {
+  add(sum: WebGLRenderTarget, sun: DirectionalLight, choice: LightChoice): void {
     const suns = discDirections(sun.direction, sun.angle ?? this.angle);
     for (const direction of suns) {
       this.look(direction);
-      this.maps.add(sum, sun.color.map((value) => value / suns.length) as unknown as Triple);
+      this.maps.add(sum, sun.color.map((value) => value / suns.length) as unknown as Triple, choice);
     }
   }
 

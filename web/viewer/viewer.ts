@@ -3,7 +3,7 @@ import { NoToneMapping, WebGLRenderer } from "three";
 import { type Asset, type Light, lightDomainOf, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
-import { assetFacts, capturedPlaces, firstLights, inside, kindsOf, missingLine, outsideLine, redesign } from "./asset_lights";
+import { assetFacts, capturedPlaces, firstLights, inside, kindsOf, linkableOf, missingLine, outsideLine, redesign } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
 import { firstBall, roomOf } from "./ball_state";
@@ -350,7 +350,9 @@ export class Viewer {
       this.comparison.off();
       this.directions.marked = -1;
       if (this.state.compare !== "off" && !this.besideCycles) say(this.loaded.references ? `comparing needs a ${this.inCloud ? "point" : "directional"} light: add one` : "nothing to compare with yet: let Cycles render", "hint");
-      return [...shiningOf(this.state.lights).flatMap((light) => lightOf(light, this.environments, this.subject.profiles) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
+      const linkable = linkableOf(this.subject.asset).length > 0;
+      const shown = shiningOf(this.state.lights).map((light) => (linkable ? light : { ...light, links: undefined }));
+      return [...shown.flatMap((light) => lightOf(light, this.environments, this.subject.profiles) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
     }
     const light = this.comparison.light(compared);
     this.directions.marked = this.comparison.compared;

@@ -4,11 +4,10 @@ import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
 import { ACROSS, type Gather, gathered, type GatherManifest, NEAR_FILES, readGather, weightRows } from "../gather";
 import { checkSize, type FloatImage, padToFour } from "../image";
+import { LinkedLight } from "../linked_light";
 import type { Triple } from "../matrix";
 import { without } from "../near_sources";
-import { Occluders } from "../occluders";
 import { decodePng } from "../png";
-import { FAR } from "../received_light";
 import shader from "../shaders/deep_framebuffer.glsl";
 import { type Placed, placed } from "../surfels";
 import type { Fail, Method, Tables } from "./method";
@@ -96,14 +95,12 @@ export const deepFramebuffer: Method = {
 
 /** The irradiance of all clusters, and what lobes gather, by shadow rays; a light that has changed in color alone is not computed again. */
 function projection(gather: Gather): Tables["projectedWeights"] {
-  const { cells, corners } = gather.surfels;
-  let occluders: Occluders | undefined;
+  const received = new LinkedLight(gather.surfels);
   let known = new Map<string, Float64Array>(); // of white lights
   const white = (light: Placed): Float64Array => {
-    occluders ??= new Occluders(corners);
-    const irradiance = cells.under(light, occluders, FAR, cells.count);
+    const irradiance = received.under(light);
     const near = gather.near?.sources(irradiance, "position" in light ? light.position : undefined);
-    return gathered(gather, irradiance, near && gather.near && { far: without(near, irradiance), sent: gather.near.irradiance(near, occluders) });
+    return gathered(gather, irradiance, near && gather.near && { far: without(near, irradiance), sent: gather.near.irradiance(near, received.occluders) });
   };
   return (lights) => {
     if (lights.named.length) throw new SrbfError(`expected lights inside the scene for a deep framebuffer, found ${JSON.stringify(lights.named[0].name)}`);

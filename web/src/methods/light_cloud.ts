@@ -109,7 +109,7 @@ class Rays {
     const scene = manifest.scene as string;
     const [cells, corners, values, transfer] = await Promise.all([
       files.bytes(file).then((buffer) => new Cells(decodeFloat(buffer, file), file)),
-      files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
+      files.bytes(scene).then((buffer) => readOccluders(buffer, scene).corners),
       readLightValues(files, manifest, functions),
       readTransfer(files, manifest),
     ]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What one look of a light lays on each cell of a scene's surfaces, added to that of the looks before: the arithmetic of srbf/visibility/received.py.
-// SRBF_PROFILE: the light has a profile. SRBF_DISTANT: a directional light. SRBF_SHADOW: 0 none, 1 a map of the asset's own triangles, 2 an engine's map that compares, 3 one that holds
+// SRBF_PROFILE: the light has a profile. SRBF_CHOSEN: it shines on some cells alone. SRBF_DISTANT: a directional light. SRBF_SHADOW: 0 none, 1 a map of the asset's own triangles, 2 an engine's map that compares, 3 one that holds
 // depths (or their means, VSM). SRBF_MEAN_NORMALS: normals may be means over several faces. SRBF_REVERSED: the engine's depth is 1 where it is nearest.
 precision highp float;
 precision highp int;
@@ -37,6 +37,9 @@ uniform sampler2D profile;
 uniform vec3 profileAcross;
 uniform vec3 profileUp;
 uniform float profileTangent;
+#endif
+#ifdef SRBF_CHOSEN
+uniform sampler2D chosen;    // 1 on the cells that it shines on, else 0
 #endif
 #if SRBF_SHADOW == 1
 uniform sampler2D nearness;  // six faces of a cube, or one map of a directional light
@@ -163,6 +166,9 @@ void main() {
     vec4 cell = texelFetch(places, at, 0);
     vec3 normal = texelFetch(normals, at, 0).xyz;
     vec3 amount = unshadowed(cell, normal);
+#ifdef SRBF_CHOSEN
+    amount *= texelFetch(chosen, at, 0).r;
+#endif
     if (amount != vec3(0.0)) {
         amount *= visibility(cell.xyz + lift * normal, normal);
     }

@@ -1,9 +1,10 @@
 /** Shadow maps of the asset's own triangles, about a place or from a direction: small, since what they shadow are cells of surfaces. */
-import { BufferAttribute, BufferGeometry, Camera, DoubleSide, GLSL3, Mesh, NearestFilter, NoBlending, RawShaderMaterial, RedFormat, FloatType, type Texture, type WebGLRenderer, WebGLRenderTarget } from "three";
+import { Camera, DoubleSide, GLSL3, Mesh, NearestFilter, NoBlending, RawShaderMaterial, RedFormat, FloatType, type Texture, type WebGLRenderer, WebGLRenderTarget } from "three";
 import { unit } from "../lights";
 import { cross, type Triple } from "../matrix";
 import fragmentShader from "../shaders/occluder_nearness.glsl";
 import vertexShader from "../shaders/occluder_corner.glsl";
+import { OccluderGeometry } from "./occluder_geometry";
 
 const NEAREST = 5e-3; // meters
 
@@ -18,7 +19,7 @@ export interface DrawnMap {
 export class OccluderMaps {
   private readonly cube: WebGLRenderTarget;
   private readonly flat: WebGLRenderTarget;
-  private readonly geometry = new BufferGeometry();
+  private readonly geometry: OccluderGeometry;
   private readonly uniforms = {
     light: { value: [0, 0, 0] as number[] },
     across: { value: [0, 0, 0] as number[] },
@@ -33,14 +34,13 @@ export class OccluderMaps {
 
   /** `corners` less `middle`; `size`: texels per side of a face, a quarter of those of a directional map. */
   constructor(corners: Float32Array, middle: Triple, private readonly radius: number, private readonly size: number) {
-    const own = corners.map((x, i) => x - middle[i % 3]);
-    this.geometry.setAttribute("position", new BufferAttribute(own, 3));
+    this.geometry = new OccluderGeometry(corners, middle);
     const target = (width: number, height: number) =>
       new WebGLRenderTarget(width, height, { format: RedFormat, type: FloatType, magFilter: NearestFilter, minFilter: NearestFilter });
     this.cube = target(3 * size, 2 * size);
     this.flat = target(4 * size, 4 * size);
     const mesh = (defines: Record<string, number>) => {
-      const made = new Mesh(this.geometry, new RawShaderMaterial({ glslVersion: GLSL3, uniforms: this.uniforms, vertexShader, fragmentShader, defines, side: DoubleSide, blending: NoBlending }));
+      const made = new Mesh(this.geometry.of(), new RawShaderMaterial({ glslVersion: GLSL3, uniforms: this.uniforms, vertexShader, fragmentShader, defines, side: DoubleSide, blending: NoBlending }));
       made.frustumCulled = false;
       return made;
     };
@@ -50,11 +50,12 @@ export class OccluderMaps {
 
   /**
    * Draw what a light sees; `place` is its place, or the direction to a distant one. What is nearer to it than `nearest` (m) casts no shadow.
-   * The renderer clears nothing by itself.
+   * `casting`: of each triangle whether it casts one, all of them without. The renderer clears nothing by itself.
    */
-  draw(renderer: WebGLRenderer, place: Triple, distant: boolean, nearest = NEAREST): DrawnMap {
+  draw(renderer: WebGLRenderer, place: Triple, distant: boolean, nearest = NEAREST, casting?: Uint8Array): DrawnMap {
     const { uniforms, size, camera } = this;
     const target = distant ? this.flat : this.cube;
+    this.near.geometry = this.far.geometry = this.geometry.of(casting);
     renderer.setClearColor(0, 0);
     if (distant) {
       const across = unit(Math.abs(place[2]) < 0.9 ? cross([0, 0, 1], place) : cross([1, 0, 0], place));

@@ -6,6 +6,7 @@ import type { Look, PackedCells, Surfels } from "../surfels";
 import { type ShadowedLook, shadowUniforms } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
+import { LitCells } from "./lit_cells";
 import { OccluderMaps } from "./occluder_maps";
 import { ProfileTextures } from "./profile_textures";
 
@@ -25,6 +26,7 @@ export class SurfelIrradiance {
   private soft?: OccluderMaps;
   private readonly passes = new Map<string, FullscreenPass>();
   private readonly profiles = new ProfileTextures();
+  private readonly lit: LitCells;
 
   /** `shadowSize`: texels per side of a face of the shadow maps; `defines` of surfel_irradiance.glsl. */
   constructor(
@@ -38,6 +40,7 @@ export class SurfelIrradiance {
     this.normals = floatTexture(cells.normals, cells.width, cells.height);
     this.sums = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
     this.maps = new OccluderMaps(surfels.corners, cells.middle, cells.reach, shadowSize);
+    this.lit = new LitCells(cells.width, cells.height);
   }
 
   /** The irradiance of all `looks` together, one texel per cell; within `undisturbed`. */
@@ -55,19 +58,20 @@ export class SurfelIrradiance {
 
   dispose(): void {
     this.soft?.dispose();
-    for (const one of [this.places, this.normals, ...this.sums, this.maps, ...this.passes.values(), this.profiles]) one.dispose();
+    for (const one of [this.places, this.normals, ...this.sums, this.maps, ...this.passes.values(), this.profiles, this.lit]) one.dispose();
   }
 
   private add(renderer: WebGLRenderer, look: ShadowedLook, former: Texture, next: WebGLRenderTarget): void {
     const shadow = look.shadow ? shadowUniforms(renderer, look.shadow, this.cells.middle) : undefined;
-    const defines = { ...this.defines, ...(look.distant ? { SRBF_DISTANT: 1 } : {}), ...(look.shape ? { SRBF_PROFILE: 1 } : {}), SRBF_SHADOW: 1, ...shadow?.defines };
+    const { lit, casting } = this.chosen(look);
+    const defines = { ...this.defines, ...(look.distant ? { SRBF_DISTANT: 1 } : {}), ...(look.shape ? { SRBF_PROFILE: 1 } : {}), ...(lit ? { SRBF_CHOSEN: 1 } : {}), SRBF_SHADOW: 1, ...shadow?.defines };
     const key = JSON.stringify(defines);
     let pass = this.passes.get(key);
     if (!pass) {
       pass = irradiancePass(this.uniforms(), defines);
       this.passes.set(key, pass);
     }
-    const own = shadow ? {} : this.mapsOf(look).draw(renderer, look.place, look.distant);
+    const own = shadow ? {} : this.mapsOf(look).draw(renderer, look.place, look.distant, undefined, casting);
     const values: Record<string, unknown> = {
       former,
       light: look.place,
@@ -80,11 +84,17 @@ export class SurfelIrradiance {
       versineOuter: look.cone ? versine(look.cone[1]) : 4,
       lambertian: look.lambertian ? 1 : 0,
       ...(look.shape ? this.profiles.uniforms(look.shape) : {}),
+      ...(lit ? { chosen: this.lit.of(lit) } : {}),
       ...own,
       ...shadow?.values,
     };
     for (const [name, value] of Object.entries(values)) pass.uniforms[name].value = value;
     pass.draw(renderer, next);
+  }
+
+  private chosen({ links = {} }: Look): { lit?: Uint8Array; casting?: Uint8Array } {
+    const { objects } = this.surfels;
+    return { lit: objects?.lit(links), casting: objects?.casting(links) };
   }
 
   private mapsOf({ factor }: Look): OccluderMaps {
@@ -94,7 +104,7 @@ export class SurfelIrradiance {
   }
 
   private uniforms(): Record<string, IUniform> {
-    const names = ["former", "light", "color", "axis", "a0", "radius", "falloff", "versineInner", "versineOuter", "lambertian", "nearness", "reach", "across", "up", "profile", "profileAcross", "profileUp", "profileTangent"];
+    const names = ["former", "light", "color", "axis", "a0", "radius", "falloff", "versineInner", "versineOuter", "lambertian", "nearness", "reach", "across", "up", "profile", "profileAcross", "profileUp", "profileTangent", "chosen"];
     const shadows = ["sceneFromCell", "shadowMatrix", "shadowBias", "shadowNormalBias", "shadowIntensity", "shadowDepths", "shadowMap"];
     const uniforms: Record<string, IUniform> = Object.fromEntries([...names, ...shadows].map((name) => [name, { value: null }]));
     return { ...uniforms, places: { value: this.places }, normals: { value: this.normals }, lift: { value: this.lift }, sceneFromCell: { value: new Matrix4() } };

@@ -1,5 +1,6 @@
 /** Jobs that the tests send to a page, and their results. */
-import { areaLight, directionalLight, type EnvironmentLight, environmentLight, type Light, namedLight, pointLight, Profile, sphereLight, spotLight, type Triple } from "../../src";
+import { areaLight, directionalLight, type EnvironmentLight, environmentLight, type Light, type Links, namedLight, type Objects, pointLight, Profile, sphereLight, spotLight, type Triple } from "../../src";
+import { linksOf } from "../../src/light_linking";
 
 export interface Job {
   run: string;
@@ -23,7 +24,15 @@ export interface Picture {
 
 let lastMap: EnvironmentLight | undefined; // what an environment without pixels turns
 
+/** With what it chooses of the scene's objects. */
 export function lightOfJson(json: LightJson): Light {
+  const choice = (own: unknown) => own && (Object.fromEntries(Object.entries(own).filter(([, names]) => names !== null)) as Objects);
+  const links = { receivers: choice(json.receivers), blockers: choice(json.blockers) } as Links;
+  const light = unlinked(json);
+  return light.kind === "environment" || light.kind === "named" ? light : { ...light, ...linksOf(links) };
+}
+
+function unlinked(json: LightJson): Light {
   const shape = json.profile ? { profile: profileOf(json.profile as ProfileJson), direction: json.direction as Triple, roll: json.roll as number } : {};
   const options = { color: json.color, a0: json.a0 as number, falloff: json.falloff as "linear", radius: json.radius as number, ...shape };
   if (json.kind === "directional") return directionalLight(json.direction as Triple, json.color);

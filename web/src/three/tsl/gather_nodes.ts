@@ -10,8 +10,7 @@ import { SrbfError } from "../../errors";
 import { ACROSS, type Gather, weightRows } from "../../gather";
 import type { Triple } from "../../matrix";
 import type { NearSources } from "../../near_sources";
-import { Occluders } from "../../occluders";
-import { FAR } from "../../received_light";
+import { LinkedLight } from "../../linked_light";
 import type { ShapeLights } from "../../shape_weights";
 import { type PackedCells, packedCells, type Placed } from "../../surfels";
 import { keyOf, type ShadowedLook } from "../engine_shadows";
@@ -39,7 +38,7 @@ export class GatherNodes {
   private readonly cells: PackedCells;
   private readonly direct: IrradianceNodes;
   private readonly near?: NearNodes;
-  private occluders?: Occluders;
+  private readonly received: LinkedLight;
   /** Of the surfels, a texture node. */
   private readonly irradiance: N;
   private readonly textures: DataTexture[];
@@ -65,6 +64,7 @@ export class GatherNodes {
   ) {
     const cells = (this.cells = packedCells(gather.surfels));
     this.middle = cells.middle;
+    this.received = new LinkedLight(gather.surfels);
     this.direct = new IrradianceNodes(gather.surfels, cells, shadowSize, true);
     this.irradiance = texture(this.direct.sums[0].texture);
     const albedo = colorTexture(gather.albedo, cells);
@@ -144,9 +144,7 @@ export class GatherNodes {
 
   /** The surfels that are far brighter than the mean under a light. */
   private bright(light: Placed): NearSources | undefined {
-    const { near, surfels } = this.gather;
-    this.occluders ??= new Occluders(surfels.corners);
-    return near?.sources(surfels.cells.under(light, this.occluders, FAR, surfels.cells.count), "position" in light ? light.position : undefined);
+    return this.gather.near?.sources(this.received.under(light), "position" in light ? light.position : undefined);
   }
 
   private made(): Gathered {

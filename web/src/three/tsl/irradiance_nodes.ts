@@ -6,6 +6,7 @@ import { versine as versineOf } from "../../point_light";
 import type { PackedCells, Surfels } from "../../surfels";
 import type { EngineShadow, ShadowedLook } from "../engine_shadows";
 import { floatTexture } from "../float_textures";
+import { LitCells } from "../lit_cells";
 import { ProfileTextures } from "../profile_textures";
 import { depthsOf, seenInMap, setShadow, shadowUniforms } from "./engine_shadow_nodes";
 import type { N } from "./nodes";
@@ -43,6 +44,10 @@ export class IrradianceNodes {
   private readonly profiles = new ProfileTextures();
   private readonly unshaped = floatTexture(new Float32Array(4), 1, 1);
   private readonly profile: N = texture(this.unshaped);
+  private readonly lit: LitCells;
+  private readonly everywhere: Uint8Array;
+  /** Of each cell whether the look shines on it. */
+  private readonly chosen: N;
   private readonly maps: Maps;
   private soft?: Maps;
   /** Of shadows that three has drawn. */
@@ -58,6 +63,9 @@ export class IrradianceNodes {
     this.places = floatTexture(cells.places, cells.width, cells.height);
     this.normals = floatTexture(cells.normals, cells.width, cells.height);
     this.sums = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
+    this.lit = new LitCells(cells.width, cells.height);
+    this.everywhere = new Uint8Array(cells.width * cells.height).fill(1);
+    this.chosen = texture(this.lit.of(this.everywhere));
     this.maps = this.mapsOf(shadowSize);
   }
 
@@ -85,7 +93,7 @@ export class IrradianceNodes {
   dispose(): void {
     const maps = [this.maps, ...(this.soft ? [this.soft] : [])];
     for (const { made } of [...maps, ...this.engine.values()]) disposeOf(Object.values(made).flat());
-    for (const one of [...maps.map(({ own }) => own), this.profiles, this.unshaped, this.places, this.normals, ...this.sums]) one.dispose();
+    for (const one of [...maps.map(({ own }) => own), this.profiles, this.unshaped, this.lit, this.places, this.normals, ...this.sums]) one.dispose();
   }
 
   private mapsOf(size: number): Maps {
@@ -96,7 +104,7 @@ export class IrradianceNodes {
   }
 
   private passes({ visible, made }: Passes, kind: Kind): Both {
-    const cells = { places: this.places, normals: this.normals, lift: this.surfels.cells.lift };
+    const cells = { places: this.places, normals: this.normals, chosen: this.chosen, lift: this.surfels.cells.lift };
     const from = (i: 0 | 1) => pass(irradianceNode(this.uniforms, cells, this.sums[i].texture, kind === "far", visible[kind], kind === "profiled" ? this.profile : undefined), this.sums[1 - i]);
     return (made[kind] ??= [from(0), from(1)]);
   }
@@ -116,8 +124,12 @@ export class IrradianceNodes {
   }
 
   private set(renderer: Renderer, look: ShadowedLook, maps: OccluderNodes): void {
-    const axes = look.distant && !look.shadow ? maps.drawFar(renderer, look.place) : undefined;
-    if (!look.distant && !look.shadow) maps.drawNear(renderer, look.place);
+    const { objects } = this.surfels;
+    const { links = {} } = look;
+    const casting = objects?.casting(links);
+    this.chosen.value = this.lit.of(objects?.lit(links) ?? this.everywhere);
+    const axes = look.distant && !look.shadow ? maps.drawFar(renderer, look.place, casting) : undefined;
+    if (!look.distant && !look.shadow) maps.drawNear(renderer, look.place, undefined, casting);
     const shape = look.shape && this.profiles.uniforms(look.shape);
     if (shape) this.profile.value = shape.profile;
     const sides = shape ? { profileAcross: shape.profileAcross, profileUp: shape.profileUp } : {};

@@ -1,9 +1,10 @@
 /** Shadow maps of the asset's own triangles for WebGPURenderer: `OccluderMaps`, a target to a face. */
-import { BufferAttribute, BufferGeometry, DoubleSide, FloatType, Mesh, NearestFilter, NoBlending, OrthographicCamera, RedFormat, RenderTarget, Vector3 } from "three";
+import { DoubleSide, FloatType, Mesh, NearestFilter, NoBlending, OrthographicCamera, RedFormat, RenderTarget, Vector3 } from "three";
 import * as tsl from "three/tsl";
 import { NodeMaterial, type Renderer } from "three/webgpu";
 import { unit } from "../../lights";
 import { cross, type Triple } from "../../matrix";
+import { OccluderGeometry } from "../occluder_geometry";
 import type { N } from "./nodes";
 
 const { dot, positionGeometry, uniform, varying, vec4 } = tsl as Record<string, N>;
@@ -12,7 +13,7 @@ const NEAREST = 5e-3; // meters
 export class OccluderNodes {
   readonly faces: readonly RenderTarget[];
   readonly far: RenderTarget;
-  private readonly geometry = new BufferGeometry();
+  private readonly geometry: OccluderGeometry;
   private readonly uniforms = { light: uniform(new Vector3()), across: uniform(new Vector3()), up: uniform(new Vector3()), ahead: uniform(new Vector3()), nearest: uniform(NEAREST) } as Record<string, N>;
   private readonly near: Mesh;
   private readonly distant: Mesh;
@@ -20,7 +21,7 @@ export class OccluderNodes {
 
   /** `corners` less `middle`; all within `reach` (m) of it. `size`: texels per side of a face, a quarter of those of a directional map. */
   constructor(corners: Float32Array, middle: Triple, readonly reach: number, readonly size: number) {
-    this.geometry.setAttribute("position", new BufferAttribute(corners.map((x, i) => x - middle[i % 3]), 3));
+    this.geometry = new OccluderGeometry(corners, middle);
     const target = (side: number) => new RenderTarget(side, side, { format: RedFormat, type: FloatType, magFilter: NearestFilter, minFilter: NearestFilter });
     this.faces = Array.from({ length: 6 }, () => target(size));
     this.far = target(4 * size);
@@ -32,8 +33,9 @@ export class OccluderNodes {
     this.distant = this.mesh(vec4(dot(positionGeometry, across).div(reach), dot(positionGeometry, up).div(reach), height.div(-4 * reach).add(1), 1), varying(height));
   }
 
-  /** Draw what a light at a place sees. What is nearer to it than `nearest` (m) casts no shadow. */
-  drawNear(renderer: Renderer, place: Triple, nearest = NEAREST): void {
+  /** Draw what a light at a place sees. What is nearer to it than `nearest` (m) casts no shadow; `casting`: of each triangle whether it casts one, all of them without. */
+  drawNear(renderer: Renderer, place: Triple, nearest = NEAREST, casting?: Uint8Array): void {
+    this.near.geometry = this.geometry.of(casting);
     this.uniforms.light.value.set(...place);
     this.uniforms.nearest.value = nearest;
     this.faces.forEach((face, i) => {
@@ -45,8 +47,9 @@ export class OccluderNodes {
     });
   }
 
-  /** Draw what a light in a direction sees; the axes of the map. */
-  drawFar(renderer: Renderer, direction: Triple): { across: Triple; up: Triple } {
+  /** Draw what a light in a direction sees, of what is `casting`; the axes of the map. */
+  drawFar(renderer: Renderer, direction: Triple, casting?: Uint8Array): { across: Triple; up: Triple } {
+    this.distant.geometry = this.geometry.of(casting);
     const across = unit(Math.abs(direction[2]) < 0.9 ? cross([0, 0, 1], direction) : cross([1, 0, 0], direction));
     const up = cross(direction, across);
     this.look(across, up, direction);
@@ -69,7 +72,7 @@ export class OccluderNodes {
     material.fragmentNode = vec4(nearness, 0, 0, 1);
     material.side = DoubleSide;
     material.blending = NoBlending;
-    const mesh = new Mesh(this.geometry, material);
+    const mesh = new Mesh(this.geometry.of(), material);
     mesh.frustumCulled = false;
     return mesh;
   }

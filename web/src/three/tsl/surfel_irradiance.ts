@@ -38,6 +38,8 @@ export function lookUniforms() {
 export interface CellTextures {
   places: Texture;
   normals: Texture;
+  /** A texture node whose red is 1 on cells that the look shines on, else 0. */
+  chosen: N;
   lift: number;
 }
 
@@ -57,6 +59,7 @@ export function irradianceNode(u: Record<string, N>, cells: CellTextures, former
     const cell = textureLoad(cells.places, at).toVar();
     const normal = textureLoad(cells.normals, at).xyz.toVar();
     const amount = (distant ? vec3(max(dot(normal, u.light), 0)) : fromPlace(u, cell, normal, profile)).toVar();
+    amount.mulAssign(textureLoad(cells.chosen, at).r);
     If(dot(amount, vec3(1)).greaterThan(0), () => {
       const place = cell.xyz.add(normal.mul(cells.lift)).toVar();
       amount.mulAssign(visibility(place, normal));
