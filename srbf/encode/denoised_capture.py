@@ -16,6 +16,7 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float, Float32, Int
 from srbf.capture import COVERED, Capture
 from srbf.captured_light import CapturedLight
+from srbf.compute.threads import each
 from srbf.encode.model_selection import sampled_texels
 from srbf.encode.plane_filter import MEDIAN, NEIGHBORS, Neighbors, off_planes, plane_filter
 from srbf.io.image_blocks import blocks
@@ -49,15 +50,20 @@ class DenoisedCapture(Capture):
         return self.of.coverage()
 
     def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
+        self.require_whole(indices)
         place = np.full(self.width * self.height, -1, np.int64)
         place[self.texels] = np.arange(len(self.texels))
         inside = place[texels] >= 0
         rows = self.rows[place[texels[inside]]]
-        needed = np.unique(rows.indices)
-        responses = self.of.sample(indices, texels)
-        filtered = np.flatnonzero([self.lights[i].role == "train" for i in indices])
-        sources = self.of.sample([indices[i] for i in filtered], self.texels[needed]).reshape(len(needed), -1)
-        responses[np.ix_(inside, filtered)] = (rows[:, needed] @ sources).reshape(-1, len(filtered), 3)
+        responses = np.empty((len(texels), len(indices), 3), np.float32)
+
+        def read(column: int) -> None:
+            image = self.of._stored(indices[column])
+            responses[:, column] = image[texels]
+            if self.lights[indices[column]].role == "train":
+                responses[inside, column] = rows @ image[self.texels].astype(np.float32)
+
+        each(read, len(indices))
         return responses
 
     def _stored_type(self, indices: Sequence[int]) -> np.dtype:

@@ -28,9 +28,9 @@ def filtered(
 ) -> Capture:
     """The capture that a method is to fit: with less noise (see `srbf.encode.denoised_capture`) where `denoise` says so, else itself.
 
-    `auto`: two fits to a sample of the texels are compared on the validation lights. The filter is kept if it lowers their pooled error,
-    and their mean PSNR rises by WORTH and by CERTAINTY standard errors. Of a method that takes minutes, it is not. Lightmaps under
-    directional lights alone have it. InputError on `on` for others, and with `by_blocks` of rows, which are fitted without their neighbors.
+    `auto`: two fits to a sample of the texels are compared on the validation lights. The filter is kept if their pooled PSNR rises by
+    WORTH, and their mean one by that and by CERTAINTY standard errors. Of a method that takes minutes, it is not. Lightmaps under
+    directional lights and of patches have it. InputError on `on` for others, and with `by_blocks` of rows, fitted without their neighbors.
     """
     if denoise not in get_args(Denoise):
         raise InputError(f"expected `denoise` auto, on or off, found {denoise!r}")
@@ -38,7 +38,7 @@ def filtered(
         return capture
     lacking = _lacking(capture, by_blocks)
     if lacking is not None and denoise == "on":
-        raise InputError(f"expected a lightmap under directional lights with `denoise=on`, found {lacking}; leave it out")
+        raise InputError(f"expected a lightmap under directional lights or of patches with `denoise=on`, found {lacking}; leave it out")
     if lacking is not None or (denoise == "auto" and not (method.quick and len(capture.indices("validation")) >= FEWEST_LIGHTS)):
         return capture
     clean = denoised(capture)
@@ -52,23 +52,21 @@ def filtered(
     gains = 20 * np.log10(np.maximum(before, 1e-30) / np.maximum(after, 1e-30))
     least = max(WORTH, CERTAINTY * float(gains.std(ddof=1)) / np.sqrt(len(gains)))
     pooled = 20 * float(np.log10(np.linalg.norm(before) / max(float(np.linalg.norm(after)), 1e-30)))
-    kept = float(gains.mean()) > least and pooled > 0
-    say(
-        f"{'denoised the images' if kept else 'left the images as they are'}: by a filter on the surfaces, validation lights of a sample "
-        f"{'gain' if kept else 'would gain'} {gains.mean():.2f} dB (pooled {pooled:.2f})"
-    )
+    kept = float(gains.mean()) > least and pooled > WORTH
+    verb = "gain" if kept else "would change by"
+    say(f"{'denoised' if kept else 'not denoised'}: validation lights of a sample {verb} {gains.mean():.2f} dB, {pooled:.2f} dB pooled")
     return clean if kept else capture
 
 
 def _lacking(capture: Capture, by_blocks: bool) -> str | None:
-    """What is there in place of a lightmap's whole images under directional lights."""
+    """What is there in place of a lightmap's images that neighbors may be averaged of."""
     receivers = [entry for entry in (capture.manifest.get("receiver"), *capture.manifest.get("receivers", [])) if entry is not None]
     kinds = {entry["kind"] for entry in receivers}
     if by_blocks:
         return "`dask`, which fits rows without their neighbors"
     if capture.is_cubemap:
         return "a capture by rays"
-    if capture.kind != "directional":
+    if capture.kind not in ("directional", "patch"):
         return f"{capture.kind} lights"
     return None if kinds == {"lightmap"} else " and ".join(sorted(kinds)) or "images without a receiver"
 
