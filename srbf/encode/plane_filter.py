@@ -48,9 +48,14 @@ class Neighbors:
         near, _ = cKDTree(places).query(places[:: max(1, len(places) // 2048)], 2)
         size = max(float(np.median(near[:, 1])), 1e-9)
         keys = np.concatenate([places / size, NORMAL_SCALE * facing], axis=1)
-        far, number = cKDTree(keys).query(keys, NEIGHBORS + 1, distance_upper_bound=REACH, workers=-1)
-        known = np.isfinite(far[:, 1:])
-        return Neighbors(places, facing, size, np.where(known, number[:, 1:], 0).astype(np.int32), known)
+        tree = cKDTree(keys)
+        number, known = np.zeros((len(keys), NEIGHBORS), np.int32), np.zeros((len(keys), NEIGHBORS), bool)
+        for start in range(0, len(keys), BATCH):
+            part = slice(start, start + BATCH)
+            far, found = tree.query(keys[part], NEIGHBORS + 1, distance_upper_bound=REACH, workers=-1)
+            known[part] = np.isfinite(far[:, 1:])
+            number[part] = np.where(known[part], found[:, 1:], 0)
+        return Neighbors(places, facing, size, number, known)
 
     def within(self, labels: Int[ndarray, " n"]) -> Neighbors:
         """Only those of the same label."""
@@ -117,7 +122,8 @@ def plane_filter(neighbors: Neighbors, guide: Float32[ndarray, "n S"], variance:
         own[~chosen, -1] = 1
         rows[part] = own / own.sum(axis=1, keepdims=True)
     columns = np.concatenate([neighbors.number, np.arange(count, dtype=np.int32)[:, None]], axis=1)
-    made = csr_array((rows.ravel(), columns.ravel(), np.arange(count + 1, dtype=np.int64) * width), shape=(count, count))
+    ends = np.arange(count + 1, dtype=np.int64) * width
+    made = csr_array((rows.ravel(), columns.ravel(), ends.astype(np.int32 if ends[-1] < 1 << 31 else np.int64)), shape=(count, count))
     made.eliminate_zeros()
     return made
 
