@@ -11,9 +11,11 @@ from made_lightmaps import floor_capture
 
 from srbf.asset import Asset
 from srbf.capture import Capture
+from srbf.captured_light import LightKind
+from srbf.encode.denoised_capture import DenoisedCapture
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
-from srbf.fitting.denoising import Denoise
+from srbf.fitting.denoising import Denoise, filtered
 from srbf.fitting.options import encode
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.protocol import FitRun
@@ -70,3 +72,17 @@ def test_captures_that_it_is_not_for_are_left_alone(make_capture: Make) -> None:
         fitted(view, "yes", said)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="found `dask`"):
         encode(RelightingMap(k=4, ridge=0.1, spread=0.5), capture, FitRun(solve_rows=never), denoise="on")
+
+
+def test_patches_are_denoised_and_point_lights_are_not(make_capture: Make) -> None:
+    capture = floor_capture(make_capture, 0.4)
+
+    def under(kind: LightKind) -> Capture:
+        return replace(capture, lights=tuple(replace(light, kind=kind) for light in capture.lights))
+
+    found = filtered(METHOD, under("patch"), "on")
+    assert isinstance(found, DenoisedCapture) and (found.image(3) != capture.image(3)).any()
+    points = under("point")
+    assert filtered(METHOD, points) is points
+    with pytest.raises(InputError, match="found point lights; leave it out"):
+        filtered(METHOD, points, "on")
