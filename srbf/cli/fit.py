@@ -17,6 +17,7 @@ from srbf.compute.dask_client import Cluster, checked
 from srbf.encode.row_blocks import fit_tiles
 from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.evaluation.viewer_errors import viewer_errors, viewer_line
+from srbf.fitting.denoising import Denoise
 from srbf.fitting.options import encode, method_for
 from srbf.io.files import check_replaceable
 from srbf.methods import FitRun, method_of
@@ -34,6 +35,12 @@ def fit(
     stitch: Annotated[
         bool, typer.Option("--stitch/--no-stitch", help="Make the two sides of UV seams agree, where the capture has any.")
     ] = True,
+    denoise: Annotated[
+        Denoise,
+        typer.Option(
+            "--denoise", help="Filter the noise of few samples out of a lightmap's fitted images; auto: where validation lights gain."
+        ),
+    ] = "auto",
     force: Force = False,
 ) -> None:
     """Fit an asset to the train lights and measure its error on every role of the capture.
@@ -51,11 +58,11 @@ def fit(
     watch = None
     if dask is not None:
         with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
-            asset = encode(chosen, opened, FitRun(update, solve_rows=partial(_solve_rows, cluster), say=note), stitch)
+            asset = encode(chosen, opened, FitRun(update, solve_rows=partial(_solve_rows, cluster), say=note), stitch, denoise)
     else:
         watch = TrainErrorAccumulator(opened)
         with progress_bar("fit") as update:
-            asset = encode(chosen, opened, FitRun(update, watch.look, say=note), stitch)
+            asset = encode(chosen, opened, FitRun(update, watch.look, say=note), stitch, denoise)
     fitted = time.perf_counter()
     if (caution := chosen.caution(opened)) is not None:
         note(caution)

@@ -11,6 +11,7 @@ from srbf.capture import Capture
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
 from srbf.fitting.auto_method import check_budget, within_budget
+from srbf.fitting.denoising import Denoise, filtered
 from srbf.light_domain import domain_of_capture
 from srbf.methods.protocol import QUIET, FitRun, Method
 from srbf.registry import all_methods, method_named, method_names
@@ -24,6 +25,7 @@ def fit(
     method: str | Method | None = None,
     *,
     stitch: bool = True,
+    denoise: Denoise = "auto",
     run: FitRun = QUIET,
     say: Callable[[str], None] = lambda line: None,
     **settings: Any,
@@ -41,6 +43,8 @@ def fit(
         lights of a sample.
     stitch
         Close the seams of the UV layer, where the capture has any.
+    denoise
+        Filter the noise of few samples out of a lightmap's train images first; `auto`: where a sample's validation lights gain.
     run
         What to report progress to.
     say
@@ -71,8 +75,8 @@ def fit(
     if isinstance(method, Method):
         if settings:
             raise InputError(f"expected settings within the method, found {', '.join(settings)} beside {method.name}")
-        return encode(method, capture, run, stitch)
-    return encode(method_for(capture, method, settings, say), capture, run, stitch)
+        return encode(method, capture, run, stitch, denoise)
+    return encode(method_for(capture, method, settings, say), capture, run, stitch, denoise)
 
 
 def method_for(
@@ -135,15 +139,18 @@ def _variant(method: str, settings: dict[str, Any]) -> str:
     return variant if variant in method_names() else method
 
 
-def encode(method: Method, capture: Capture, run: FitRun = QUIET, stitch: bool = True) -> Asset:
-    """The asset of a method, the capture's UV seams closed where it has any and `stitch` says so.
+def encode(method: Method, capture: Capture, run: FitRun = QUIET, stitch: bool = True, denoise: Denoise = "auto") -> Asset:
+    """The asset of a method, the capture's UV seams closed where it has any and `stitch` says so, its images filtered as `denoise` says.
 
-    InputError on `run.solve_rows` with a method whose rows are not independent.
+    InputError on `run.solve_rows` with a method whose rows are not independent, and on a capture that `denoise` cannot be on for.
     """
     if run.solve_rows is not None and not method.rows_are_independent:
         able = " or ".join(other.name for other in all_methods() if other.rows_are_independent)
         raise InputError(f"expected the method {able} to be fitted by blocks of rows, found {method.name}")
-    asset = method.encode(capture, replace(run, stitch=Stitch.of(capture) if stitch else None))
+    fitted = filtered(method, capture, denoise, run.say, run.solve_rows is not None)
+    asset = method.encode(fitted, replace(run, stitch=Stitch.of(capture) if stitch else None))
+    if fitted is not capture:
+        asset.manifest["source"]["fit"]["denoised"] = True
     asset.probes = capture.probes()
     return asset
 

@@ -79,6 +79,7 @@ class NeuralMap(Method):
     layers: ClassVar[str] = "planes"
     tables: ClassVar[dict[str, str]] = {"network": "network.exr"}
     implied_by: ClassVar[tuple[str, ...]] = ("codes",)
+    quick: ClassVar[bool] = False
     exportable: ClassVar[bool] = False
 
     codes: int = setting(12, "How many numbers per texel.")

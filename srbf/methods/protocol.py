@@ -94,6 +94,7 @@ class Method(ABC):
     receivers: ClassVar[tuple[str, ...]] = ("lightmap", "view", "vertices", "probes")
     implied_by: ClassVar[tuple[str, ...]] = ()  # settings, or setting=value, that choose the method where none is named
     rows_are_independent: ClassVar[bool] = False  # blocks of rows may be solved on other machines
+    quick: ClassVar[bool] = True  # a fit to a sample of the texels takes seconds, so that choices may compare some
     has_shader: ClassVar[bool] = True  # `glsl/methods/STEM.glsl` is there
     exportable: ClassVar[bool] = True  # layers may be encoded otherwise, for engines
     on_page: ClassVar[bool] = True  # the viewer's page and the npm package show it
