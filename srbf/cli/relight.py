@@ -50,6 +50,7 @@ from srbf.visibility.embree import has_embree
 
 FRAMES_MARKER = "0000.exr"
 REFERENCE_SAMPLES = 64  # of Cycles, unless told
+BLACK = "the picture is black: no light reaches what it shows; look at the lights' places, in meters of the scene's world, and colors"
 Viewer = tuple[float, float, float] | None
 Shadows = Literal["ray", "pca"]
 
@@ -290,6 +291,8 @@ def relight(
         (image,) = _render(_shadowed(opened, shadows), [placed], renderer, added, seen_from)
         for line in added.notes(placed):
             note(line)
+    if placed and not image.any():
+        note(BLACK)
     if places is not None:
         found = probe_light.light_at(opened, probe_light.harmonics(opened, image), *places)
         write_places(output, *places, found)

@@ -28,6 +28,7 @@ from srbf.sphere import Domain
 MOST_CLUSTERS = 256  # a texel's index is a byte
 SAMPLE_TEXELS = 1 << 14  # at least; and so many a cluster:
 TEXELS_PER_CLUSTER = 96
+MORE_PER_CLUSTER, SAMPLE_BYTES = 192, 1 << 28  # where a sample of them is no larger
 
 TRIED_CLUSTERS = (16, 64, 256)
 MOST_TRIED = 64  # components of a candidate
@@ -150,8 +151,7 @@ class ClusteredEigenMap(CoefficientMaps):
         if self.components > 3 * len(train):
             raise InputError(f"expected at most {3 * len(train)} components for {len(train)} lights, found {self.components}")
         # From every row: clusters are of places, and those of a few strips of rows serve the rows between badly.
-        least = 0 if capture.is_cubemap else SAMPLE_TEXELS  # whose rows are of thousands of lights
-        sample = TexelSample.of(capture, max(least, TEXELS_PER_CLUSTER * self.clusters), share=1.0)
+        sample = TexelSample.of(capture, self._sampled(capture, len(train)), share=1.0)
         domain = domain_of_capture(capture, self.domain)
         found = clustered_components(
             capture,
@@ -168,6 +168,12 @@ class ClusteredEigenMap(CoefficientMaps):
         else:
             functions, fit = functions_through(sample, found.functions, domain, self.spread, self.ridge)
         return coefficient_maps_asset(self, capture, domain, found.components, functions, fit, found, run.stitch)
+
+    def _sampled(self, capture: Capture, lights: int) -> int:
+        """How many texels clusters are made of."""
+        least = 0 if capture.is_cubemap else SAMPLE_TEXELS  # whose rows are of thousands of lights
+        affordable = SAMPLE_BYTES // (12 * lights * self.clusters)
+        return max(least, self.clusters * min(max(TEXELS_PER_CLUSTER, affordable), MORE_PER_CLUSTER))
 
     def __str__(self) -> str:
         return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"

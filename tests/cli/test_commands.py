@@ -136,6 +136,12 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
     assert np.abs(np.round(read_image(tmp_path / "out.png") * 255) - picture).max() <= 1
 
 
+def test_a_picture_that_no_light_reaches(asset: Path, tmp_path: Path) -> None:
+    for axis, black in ((1, True), (-1, False)):  # of a spot above the plane
+        done = srbf("relight", asset, "-o", tmp_path / f"{axis}.exr", "--spot", f"0,0,1,0,0,{axis},0.2,0.5")
+        assert done.exit_code == 0 and ("the picture is black" in done.stderr) == black
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("flags", [["eigen-map", "--components", 6], ["clustered-eigen-map", "--components", 3, "--clusters", 4]])
 def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_path: Path, flags: list) -> None:
