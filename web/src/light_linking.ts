@@ -28,6 +28,12 @@ export const isLinked = ({ receivers, blockers }: Links): boolean => Boolean(rec
 /** The choices alone of what may have more. */
 export const linksOf = ({ receivers, blockers }: Links): Links => ({ ...(receivers ? { receivers } : {}), ...(blockers ? { blockers } : {}) });
 
+/** The choice of those objects alone that have one of the names. */
+export const within = ({ only, without }: Objects, names: ReadonlySet<string>): Objects => ({
+  ...(only ? { only: only.filter((name) => names.has(name)) } : {}),
+  ...(without ? { without: without.filter((name) => names.has(name)) } : {}),
+});
+
 export const isChosen = ({ only, without }: Objects, name: string): boolean => (!only || only.includes(name)) && !without?.includes(name);
 
 /** The objects of a pool's surfels and of its scene's triangles. */
@@ -53,6 +59,12 @@ export class LinkedObjects {
     return blockers && this.chosen("blockers", blockers, this.triangles);
   }
 
+  /** @throws SrbfError on a name that the scene lacks. */
+  require({ receivers, blockers }: Links): void {
+    if (receivers) this.check("receivers", receivers);
+    if (blockers) this.check("blockers", blockers);
+  }
+
   private chosen(link: keyof Links, choice: Objects, { names, objects }: Numbered): Uint8Array {
     const key = JSON.stringify([link, choice]);
     let found = this.known.get(key);
@@ -66,7 +78,7 @@ export class LinkedObjects {
   }
 
   private check(link: keyof Links, { only = [], without = [] }: Objects): void {
-    const missing = [...(only ?? []), ...(without ?? [])].find((name) => !this.names.includes(name));
+    const missing = [...only, ...without].find((name) => !this.names.includes(name));
     if (missing === undefined) return;
     const listed = this.names.slice(0, SHOWN).map((name) => JSON.stringify(name)).join(", ");
     throw new SrbfError(`expected objects of the scene among a light's ${link}, found ${JSON.stringify(missing)}; it has ${listed || "none"}${this.names.length > SHOWN ? ", …" : ""}`);

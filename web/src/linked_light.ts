@@ -20,8 +20,8 @@ export class LinkedLight {
   under(light: Placed): Float64Array {
     const { cells, objects } = this.surfels;
     const links = light.kind === "environment-directions" ? {} : light;
-    const found = cells.under(light, this.among(objects?.casting(links)), FAR, cells.count);
-    const lit = objects?.lit(links);
+    const [lit, casting] = [objects?.lit(links), objects?.casting(links)];
+    const found = cells.under(light, this.among(casting), FAR, cells.count);
     return lit ? found.map((x, i) => x * lit[Math.floor(i / 3)]) : found;
   }
 

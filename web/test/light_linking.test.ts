@@ -1,11 +1,14 @@
 import { describe, expect, it } from "vitest";
-import { directionalLight, environmentLight, IDENTITY, inAssetFrame, type Manifest, pointLight, type Triple } from "../src";
+import { type Asset, directionalLight, environmentLight, IDENTITY, inAssetFrame, type Manifest, pointLight, type Triple } from "../src";
 import { isChosen, LinkedObjects } from "../src/light_linking";
 import { LinkedLight } from "../src/linked_light";
 import { squaredDistance } from "../src/nearest_triangle";
 import { Occluders } from "../src/occluders";
 import { Cells } from "../src/received_light";
 import { placed } from "../src/surfels";
+import { designedLights, requireObjects } from "../viewer/asset_lights";
+import { blenderRig } from "../viewer/blender_rig";
+import type { LightState } from "../viewer/light_state";
 import { choiceOf, lineOf } from "../viewer/link_controls";
 
 const NAMES = ["Cup", "Floor", "Vase"];
@@ -96,5 +99,24 @@ describe("the nearest triangle", () => {
       expect(all[occluders.nearest(x, y, z)]).toBe(Math.min(...all));
     }
     expect(new Occluders(new Float32Array()).nearest(0, 0, 0)).toBe(-1);
+  });
+});
+
+describe("lights as designed", () => {
+  const light = { kind: "point", position: [0, 0, 1], receivers: { only: ["Near", "Cable"] }, blockers: { without: ["Cable"] } };
+  const asset = { manifest: { scene_lights: [{ name: "Key", light }] }, tables: { gather: { surfels: { objects: new LinkedObjects({ names: ["Near", "Far"], objects: Int32Array.of(0, 1) }, { names: ["Far"], objects: Int32Array.of(0) }) } } } } as unknown as Asset;
+
+  it("choose among objects that the asset knows", () => {
+    const [key] = designedLights(asset);
+    expect(key.links).toEqual({ receivers: { only: ["Near"] }, blockers: { without: [] } });
+    expect(() => requireObjects(asset, [key])).not.toThrow();
+    expect(() => requireObjects(asset, [{ ...key, links: light } as LightState])).toThrow(/Cable/);
+  });
+
+  it("are as designed for Blender whatever the order of names", () => {
+    const designed = [{ name: "Key", light: { kind: "point", position: [0, 0, 1], color: [1, 1, 1], receivers: { only: ["Far", "Near"] } } }];
+    const told = (only: string[]) => JSON.parse(/LIGHTS = json.loads\(r"""(.*?)"""\)/s.exec(blenderRig([{ ...designedLights(asset)[0], links: { receivers: { only } } }] as LightState[], 0, designed))?.[1] ?? "");
+    expect(told(["Near", "Far"])[0].changed).toBe(false);
+    expect(told(["Near"])[0].changed).toBe(true);
   });
 });

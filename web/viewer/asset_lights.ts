@@ -1,7 +1,8 @@
 /** Which lights an asset can be relit by, and where those inside its scene may be. */
-import { type Asset, lightDomainOf, type Manifest, type Triple } from "../src";
+import { type Asset, lightDomainOf, type Links, type Manifest, type Triple } from "../src";
+import { linksOf, within } from "../src/light_linking";
 import { ends, heat } from "./direction_widget";
-import { isPlaced, type LightState, linearColor, namedState, type PlacedState, pointState } from "./light_state";
+import { areLinks, isPlaced, type LightState, linearColor, namedState, type PlacedState, pointState } from "./light_state";
 import { type Profiles, stateOf } from "./keyframes";
 import { MOST_LIGHTS } from "./state";
 import type { BakedLight } from "./reference";
@@ -45,7 +46,22 @@ export function assetFacts({ asset, maps, hasDirect, sunAngle, profiles }: Subje
 }
 
 /** The lights that the scene has by itself, all of them, as it has them set. @throws SrbfError on damaged ones. */
-export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(light, `light ${name} of the asset`, "inverse-square", ownProfiles(manifest)), name }) as LightState);
+export const designedLights = (asset: Asset): LightState[] => designedOf(asset).map(({ name, light }) => ({ ...stateOf(light, `light ${name} of the asset`, "inverse-square", ownProfiles(asset.manifest)), name }) as LightState);
+
+/** The scene's own lights as asset.json has them, which choose among known objects alone: others neither show light nor shadow it. */
+export function designedOf(asset: Asset): Designed {
+  const known = new Set(linkableOf(asset));
+  return (asset.manifest.scene_lights ?? []).map(({ name, light }) => {
+    const links = linksOf(light as Links);
+    if (!known.size || !areLinks(links)) return { name, light };
+    return { name, light: { ...light, ...linksOf({ receivers: links.receivers && within(links.receivers, known), blockers: links.blockers && within(links.blockers, known) }) } };
+  });
+}
+
+/** @throws SrbfError where a light's links name objects that the asset's scene lacks. */
+export function requireObjects({ tables }: Asset, lights: readonly LightState[]): void {
+  for (const { links } of lights) if (links) tables.gather?.surfels.objects?.require(links);
+}
 
 /** Those of the scene's own lights: IES files. */
 const ownProfiles = ({ scene_profiles }: Manifest): Profiles => new Map(Object.keys(scene_profiles ?? {}).map((name) => [name, { projected: false }]));

@@ -1,5 +1,5 @@
 /** The page's lights as a Python script that makes them in Blender. Units as in `blender_bake/light.py`. */
-import type { Links, Triple } from "../src";
+import type { Links, Objects, Triple } from "../src";
 import { linksOf } from "../src/light_linking";
 import { profileAxes } from "../src/light_profile";
 import { unit } from "../src/lights";
@@ -18,7 +18,7 @@ export function blenderRig(lights: readonly LightState[], sunAngle = 0, designed
   const told = lights.flatMap((light, i) => {
     if (light.kind === "environment" || light.kind === "named") return [];
     const name = light.name ?? `srbf ${light.kind} ${i + 1}`;
-    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], profile: ownProfile(light, designed), ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), links: changedLinks(light, designed), ...placed(light) }];
+    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], profile: ownProfile(light, designed), ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), links: linksOf(light.links ?? {}), changed: !hasLinksOf(light, designed), ...placed(light) }];
   });
   const kept = new Set(lights.map(({ name }) => name));
   const removed = designed.flatMap(({ name }) => (kept.has(name) ? [] : [name]));
@@ -95,10 +95,10 @@ def fill(light, told, settings):
         place.translation = light.matrix_world.translation
     light.matrix_world = place
     light.hide_render = light.hide_viewport = told["hidden"]
-    if told["links"] is not None:
-        for kind, place in (("receivers", "receiver_collection"), ("blockers", "blocker_collection")):
-            choice = told["links"].get(kind)
-            setattr(light.light_linking, place, chosen(f"srbf {light.name} {kind}", choice) if choice else None)
+    for kind, place in (("receivers", "receiver_collection"), ("blockers", "blocker_collection")):
+        present, made, choice = getattr(light.light_linking, place), f"srbf {light.name} {kind}", told["links"].get(kind)
+        if told["changed"] or (present is not None and present.name == made):  # else as designed
+            setattr(light.light_linking, place, chosen(made, choice) if choice else None)
 
 
 def chosen(name, choice):
@@ -115,7 +115,8 @@ def chosen(name, choice):
     for member, one in zip(made.collection_objects, made.objects):
         member.light_linking.link_state = states[one.name]
     if "only" in choice and not any(states[one.name] == "INCLUDE" for one in made.objects):
-        made.objects.link(bpy.data.objects.new("srbf nothing", None))  # a collection without any chooses all
+        nothing = bpy.data.objects.get("srbf nothing") or bpy.data.objects.new("srbf nothing", None)
+        made.objects.link(nothing)  # a collection without any chooses all
     return made
 
 
@@ -151,10 +152,11 @@ function colored(color: Triple, watts: number): { energy: number; color: Triple 
   return { energy: watts * Math.max(...color), color: color.map((x) => x / most) as unknown as Triple };
 }
 
-/** What a light chooses of objects; null where Blender has that already. */
-function changedLinks({ name, links = {} }: LightState, designed: Designed): Links | null {
+/** Whether a light chooses the same objects as its design. */
+function hasLinksOf({ name, links = {} }: LightState, designed: Designed): boolean {
   const own = linksOf((designed.find((one) => one.name === name)?.light ?? {}) as Links);
-  return JSON.stringify(own) === JSON.stringify(linksOf(links)) ? null : linksOf(links);
+  const sorted = ({ only, without = [] }: Objects = {}) => JSON.stringify([only && [...only].sort(), [...without].sort()]);
+  return sorted(own.receivers) === sorted(links.receivers) && sorted(own.blockers) === sorted(links.blockers);
 }
 
 /** The profile that a light of the scene has there and still has; null of others, since the script has no files. */

@@ -1,13 +1,17 @@
 /** Files that are dropped on the page: keyframes to play, and environment maps. */
 import { SrbfError } from "../src";
+import { requireObjects } from "./asset_lights";
 import { type Environment, readEnvironment } from "./environment_file";
-import { FRAMES_PER_SECOND, Keyframes, type Profiles, readFrames } from "./keyframes";
+import { FRAMES_PER_SECOND, Keyframes, readFrames } from "./keyframes";
 import { environmentState } from "./light_state";
 import { MOST_LIGHTS, type State } from "./state";
+import type { Subject } from "./subject";
 
-/** Keyframes that play from now on; `usual`: the falloff of lights that do not say; `profiles`: those that they may have. @throws SrbfError on other files. */
-export async function droppedFrames(file: File, state: State, usual: "linear" | "inverse-square", profiles: Profiles): Promise<Keyframes> {
-  const keyframes = new Keyframes(readFrames(await file.text(), file.name, usual, profiles), state);
+/** Keyframes that play from now on; `usual`: the falloff of lights that do not say; the subject tells what profiles and objects there are. @throws SrbfError on other files. */
+export async function droppedFrames(file: File, state: State, usual: "linear" | "inverse-square", { asset, profiles }: Subject): Promise<Keyframes> {
+  const frames = readFrames(await file.text(), file.name, usual, profiles);
+  for (const lights of frames) requireObjects(asset, lights);
+  const keyframes = new Keyframes(frames, state);
   keyframes.show(0);
   const { length } = keyframes.frames;
   Object.assign(state, { path: "frames", seconds: Math.max(0.1, length / FRAMES_PER_SECOND), playing: length > 1 });

@@ -3,7 +3,7 @@ import { NoToneMapping, WebGLRenderer } from "three";
 import { type Asset, type Light, lightDomainOf, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
-import { assetFacts, capturedPlaces, firstLights, inside, kindsOf, linkableOf, missingLine, outsideLine, redesign } from "./asset_lights";
+import { assetFacts, capturedPlaces, designedOf, firstLights, inside, kindsOf, linkableOf, missingLine, outsideLine, redesign, requireObjects } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
 import { firstBall, roomOf } from "./ball_state";
@@ -115,7 +115,7 @@ export class Viewer {
         changed();
       },
       saveFrames: () => this.save([this.state.lights]),
-      saveRig: () => saveRig("lights.py", this.state.lights, this.subject.sunAngle, this.subject.asset.manifest.scene_lights),
+      saveRig: () => saveRig("lights.py", this.state.lights, this.subject.sunAngle, designedOf(this.subject.asset)),
       renderReference: () => void this.cycles?.render(this.state.lights),
       stopReference: () => this.cycles?.stop(),
       redesign: () => {
@@ -216,6 +216,7 @@ export class Viewer {
     try {
       const plain = this.firstState();
       const state = decodeState(hash, plain);
+      requireObjects(this.subject.asset, state.lights);
       state.asset = Math.min(state.asset, this.loaded.facts.assets.length - 1);
       state.map = Math.min(state.map, this.subject.maps - 1);
       if (!this.loaded.references && !this.cycles?.rendered) Object.assign(state, { compare: "off", errors: false });
@@ -467,7 +468,7 @@ export class Viewer {
   /** Play the frames of a file from now on. */
   private frames(file: File): Promise<void> {
     return this.slowly(async () => {
-      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear", this.subject.profiles);
+      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear", this.subject);
       this.panel.setFacts(this.panelFacts());
     });
   }
@@ -490,6 +491,6 @@ export class Viewer {
   }
 
   private save(frames: readonly (readonly LightState[])[]): void {
-    saveFrames("FRAMES.json", frames.map((lights) => [...lights, ...emittingStates(this.subject.asset, this.state.surfaces)]), this.subject.asset.manifest.scene_lights);
+    saveFrames("FRAMES.json", frames.map((lights) => [...lights, ...emittingStates(this.subject.asset, this.state.surfaces)]), designedOf(this.subject.asset));
   }
 }
