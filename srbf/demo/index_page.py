@@ -24,8 +24,8 @@ h1 { margin: 0; font-size: 27px; font-weight: 600; }
 header p { margin: 6px 0 28px; max-width: 46em; color: #a3acb7; }
 main { display: grid; gap: 24px; grid-template-columns: repeat(auto-fit, minmax(min(100%, 320px), 1fr)); }
 article { display: flex; flex-direction: column; overflow: hidden; border: 1px solid #2c3037; border-radius: 12px; background: #17191d; }
-.picture { display: grid; place-items: center; aspect-ratio: 4 / 3; background: #1d2026; color: #8d96a1; }
-.picture img { display: block; width: 100%; height: 100%; object-fit: cover; }
+.picture { position: relative; display: grid; place-items: center; aspect-ratio: 4 / 3; background: #1d2026; color: #8d96a1; }
+.picture img { position: absolute; width: 100%; height: 100%; object-fit: cover; }
 .text { display: flex; flex-direction: column; flex: 1; padding: 18px 20px 20px; }
 h2 { margin: 0 0 6px; font-size: 19px; font-weight: 600; }
 article p { margin: 0 0 12px; }
@@ -55,7 +55,8 @@ class Card:
         shown = f'<img src="{self.picture}" alt="" />' if self.picture else "<span>no picture yet</span>"
         link = f'<a href="{escape(address(self.page, self.opens))}">Open</a>' if self.page else ""
         look = "note wrong" if self.failed else "note"
-        words = f'<h2>{escape(self.title)}</h2><p>{escape(self.sentence)}</p><p class="{look}">{escape(self.note)}</p>{link}'
+        note = escape(self.note).replace(" %", "&nbsp;%").replace(" dB", "&nbsp;dB")
+        words = f'<h2>{escape(self.title)}</h2><p>{escape(self.sentence)}</p><p class="{look}">{note}</p>{link}'
         return f'<article><div class="picture">{shown}</div><div class="text">{words}</div></article>'
 
 

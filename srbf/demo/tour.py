@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +58,7 @@ STOPS = (
         "loft",
         "Carry a light through a loft",
         "Drag the light through the door: its shadows stay crisp, and its bounces follow.",
-        {"lights": [_point(5.0, 2.55, 1.3, 4)], "tone": "agx"},
+        {"lights": [_point(3.3, 2.9, 1.5, 3)], "tone": "agx"},
         run_demo_inside,
     ),
     Stop(
@@ -86,60 +88,78 @@ def run_tour(folder: Path, reporter: Reporter, progress: Progress, quality: Qual
     for stop in STOPS:
         scene_script(stop.name)
     files.make_folder(folder)
-    cards = [stop.card() for stop in STOPS]
-    failures = []
-    said = False
-
-    def write(grows: bool = True) -> None:
-        nonlocal said
-        files.write_text(folder / INDEX, index_page(cards, grows))
-        if not said and any(card.page for card in cards):
-            said = True
-            reporter.say(f"open {folder / INDEX}: one scene can be relit now, the others follow on the same page")
-
-    for number, stop in enumerate(STOPS):
-        card = cards[number]
-        kept = _kept(folder, stop, quality)
-        if kept is not None:
-            cards[number] = kept
-            write()
-            continue
-        card.note = "Being made now."
-        write()
-
-        def ready(shown: Shown, stop: Stop = stop, card: Card = card) -> None:
-            files.write_text(folder / f"{stop.name}.html", single_file(contents_of([shown.asset], None, shown.mesh)))
-            card.page, card.note = f"{stop.name}.html", "Cycles renders what it is compared with."
-            write()
-            card.picture = data_uri(shown.picture())
-            write()
-
-        def say(line: str, stop: Stop = stop) -> None:
-            reporter.say(f"{stop.name}: {line}")
-
-        try:
-            made = stop.make(stop.name, folder / stop.name, Reporter(reporter.progress, say), progress, quality, ready)
-        except (SrbfError, OSError, MemoryError) as error:
-            failures.append(f"{stop.name} failed: {' '.join(str(error).split()) or type(error).__name__}")
-            card.note, card.failed = failures[-1], True
-            reporter.say(failures[-1])
-        else:
-            card.note = f"{made.error[0].upper()}{made.error[1:]}."
-            files.write_json(folder / stop.name / KEPT, _record(quality, card))
-        write()
-    write(grows=False)
+    tour = _Tour(folder, reporter, progress, quality)
+    failures = [line for number in range(len(STOPS)) if (line := tour.visit(number))]
+    tour.write(grows=False)
     return failures
 
 
-def _record(quality: Quality, card: Card) -> dict[str, Any]:
-    return {"srbf": srbf.__version__, "quality": quality, "card": asdict(card)}
+class _Tour:
+    """One run: the cards of its scenes, and the index that shows them."""
 
+    def __init__(self, folder: Path, reporter: Reporter, progress: Progress, quality: Quality) -> None:
+        self._folder, self._reporter, self._progress, self._quality = folder, reporter, progress, quality
+        self._cards = [stop.card() for stop in STOPS]
+        self._is_said = False
 
-def _kept(folder: Path, stop: Stop, quality: Quality) -> Card | None:
-    """The card of a scene that is finished and whose page is there."""
-    path = folder / stop.name / KEPT
-    if not path.is_file() or not (folder / f"{stop.name}.html").is_file():
+    def write(self, grows: bool = True) -> None:
+        """The index as it is now; says where it is once there is a link on it."""
+        files.write_text(self._folder / INDEX, index_page(self._cards, grows))
+        if not self._is_said and any(card.page for card in self._cards):
+            self._is_said = True
+            self._reporter.say(f"open {self._folder / INDEX}: one scene can be relit now, the others follow on the same page")
+
+    def visit(self, number: int) -> str:
+        """Make a scene, or keep it where it is finished; why it failed, or nothing."""
+        stop, card = STOPS[number], self._cards[number]
+        kept = self._kept(stop)
+        if kept is not None:
+            self._cards[number] = kept
+            self.write()
+            return ""
+        card.note, line = "Being made now.", ""
+        self.write()
+
+        def say(told: str) -> None:
+            self._reporter.say(f"{stop.name}: {told}")
+
+        reporter = Reporter(self._reporter.progress, say)
+        try:
+            made = stop.make(stop.name, self._folder / stop.name, reporter, self._progress, self._quality, partial(self._show, stop, card))
+        except Exception as error:  # noqa: BLE001  whatever it is, the other scenes can still be made
+            line = f"{stop.name} failed: {_in_one_line(error)}"
+            card.note, card.failed = line, True
+            self._reporter.say(line)
+        else:
+            card.note = f"{made.error[0].upper()}{made.error[1:]}."
+            files.write_json(self._folder / stop.name / KEPT, self._record(card))
+        self.write()
+        return line
+
+    def _show(self, stop: Stop, card: Card, shown: Shown) -> None:
+        """Write the page of a scene, then its picture on the index."""
+        files.write_text(self._folder / f"{stop.name}.html", single_file(contents_of([shown.asset], None, shown.mesh)))
+        card.page, card.note = f"{stop.name}.html", "Its errors are being measured."
+        self.write()
+        card.picture = data_uri(shown.picture())
+        self.write()
+
+    def _kept(self, stop: Stop) -> Card | None:
+        """The card of a scene that is finished and whose page is there."""
+        path = self._folder / stop.name / KEPT
+        if not path.is_file() or not (self._folder / f"{stop.name}.html").is_file():
+            return None
+        with suppress(SrbfError, KeyError, TypeError):
+            found = files.read_json(path)
+            card = Card(**found["card"])
+            if found == self._record(card):
+                return replace(card, title=stop.title, sentence=stop.sentence, opens=stop.opens)
         return None
-    found = files.read_json(path)
-    card = Card(**found["card"])
-    return card if found == _record(quality, card) and (card.title, card.opens) == (stop.title, stop.opens) else None
+
+    def _record(self, card: Card) -> dict[str, Any]:
+        return {"srbf": srbf.__version__, "quality": self._quality, "card": asdict(card)}
+
+
+def _in_one_line(error: Exception) -> str:
+    kind = "" if isinstance(error, SrbfError) else f"{type(error).__name__} "
+    return kind + " ".join(str(error).split())
