@@ -62,7 +62,7 @@ HOLDOUT_SAMPLES = 24  # fewer than a bake's default, enough for both scenes, to 
 DIRECTIONS = 400
 SPLIT_DIRECTIONS = 144  # with direct light apart: what is left has no sharp edges
 SPLIT_HOLDOUT = 8
-SPLIT_FIT = ClusteredEigenMap(components=12, clusters=64, encoding="uint8")
+SPLIT_FIT = ClusteredEigenMap(components=12, clusters=32, encoding="uint8")  # its tables of lights fit a page of 10 MiB
 SUN = DirectionalLight((-0.45, -0.5, 0.74))  # of a picture
 SCENES = {
     "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance", (512, 512)),
