@@ -126,7 +126,7 @@ def run_demo_inside(
         bake_once(Bake(blend, folder / "view", view), reporter)
         return InCamera(asset, Capture.open(folder / "view"), direct)
 
-    ready(Shown(asset_folder, mesh, lambda: shown_bytes(in_camera().pictures(scene.places[1:2])[0])))
+    ready(Shown(asset_folder, mesh, lambda: shown_bytes(in_camera().pictures(scene.places[:1])[0])))
     started = clock()
     reporter.say(f"rendering {settings.holdout} held-out lights and {len(scene.places)} pictures with Cycles")
     if bake_once(bake, reporter):

@@ -58,7 +58,7 @@ STOPS = (
         "loft",
         "Carry a light through a loft",
         "Drag the light through the door: its shadows stay crisp, and its bounces follow.",
-        {"lights": [_point(3.3, 2.9, 1.5, 3)], "tone": "agx"},
+        {"lights": [_point(3.3, 2.9, 1.5, 2)], "tone": "agx"},
         run_demo_inside,
     ),
     Stop(
