@@ -22,6 +22,7 @@ from srbf.demo.dome import DOMES, Photographs
 from srbf.demo.index_page import Card, address, data_uri, index_page
 from srbf.demo.photographs import Dome
 from srbf.errors import BakeError
+from srbf.report import abrdf_mosaic, canvas
 
 PICTURE = np.full((6, 8, 3), 90, np.uint8)
 
@@ -142,12 +143,14 @@ def test_a_split_bake_has_no_lights_to_choose_by() -> None:
 def test_a_coin_from_photographs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(DOMES, "coin", {"draft": Photographs(Dome(9, 2, 12), 24, 1)})
     monkeypatch.setattr(dome, "FIT", replace(dome.FIT, clusters=2, components=4))
-    monkeypatch.setattr(dome, "write_report", lambda *_args, **_named: tmp_path / "index.html")  # has tests of its own
+    for module in (canvas, abrdf_mosaic):
+        monkeypatch.setattr(module, "DPI", 40)
     shown: list[np.ndarray] = []
     made = dome.run_demo_dome("coin", tmp_path, Reporter(), lambda *_: None, ready=lambda own: shown.append(own.picture()))
     assert len(list((tmp_path / "photographs").glob("*.jpg"))) == 11
     assert shown[0].shape == (24, 24, 3) and shown[0].dtype == np.uint8 and shown[0].max() > 100
     assert 0 < Asset.open(made.assets[0]).manifest["error"]["holdout"]["relative_rmse"] < 1
+    assert made.page.is_file()
     assert made.error.startswith("2 held-out photographs: relative RMSE ")
 
 
