@@ -20,7 +20,7 @@ LIST = "live.md"
 BESIDE = {
     "loft": "Carry a light through the door of a furnished room: shadows are crisp, bounces follow.",
     "caustics": "A table under two glass rings, a ball and an angel of tinted glass. Move the sun: direct light is drawn by shadow maps.",
-    "coin": "A struck coin, from 40 photographs under a light dome. Rake the light over it.",
+    "coin": "A struck coin, from 48 photographs under a light dome. Rake the light over it.",
     "house": "A room by daylight, seen by one camera. Move the sun around the house.",
 }
 

@@ -46,7 +46,7 @@ class Photographs:
 
 
 DOMES: dict[str, dict[Quality, Photographs]] = {
-    "coin": {"draft": Photographs(Dome(40, 8, 12), 320, 4), "publish": Photographs(Dome(80, 20, 12), 512, 16)},
+    "coin": {"draft": Photographs(Dome(48, 8, 12), 320, 4), "publish": Photographs(Dome(80, 20, 12), 512, 16)},
 }
 
 
