@@ -3,8 +3,8 @@ PYTHON ?= python3.11
 NAME := $(notdir $(PYTHON))
 VENV ?= $(if $(filter python3.11,$(NAME)),.venv,.venv-$(NAME))
 BIN := $(VENV)/bin
-SCENE ?= loft
-OUT ?= out/$(SCENE)
+SCENE ?=
+OUT ?= out/$(or $(SCENE),demo)
 MINUTES ?= 9
 PAGE := srbf/viewer/page/index.html
 PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*.ts web/src/*/*) $(wildcard glsl/*/*.*)
@@ -26,9 +26,9 @@ $(VENV)/.tested-by: $(VENV)/.installed
 	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export,test,dev,docs]'
 	touch $@
 
-# SCENE: loft with lights inside, caustics and house under directional lights.
+# Loft, caustics and coin, and a page that has them all. SCENE: one alone; loft has lights inside, caustics, coin and house distant ones.
 demo: setup $(PAGE)
-	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
+	$(BIN)/srbf demo $(if $(SCENE),--scene $(SCENE) )-o $(OUT)
 
 # The article's figure 12 live: a bake that one would publish (half an hour on two cores, resumable), then the viewer.
 variable-lightmap: setup $(PAGE)
@@ -76,8 +76,8 @@ docs: export NO_MKDOCS_2_WARNING = 1
 docs: setup-test
 	$(BIN)/mkdocs build --strict --quiet
 
-# The same with scenes that one relights in the browser, each one file; their demos take up to ten minutes each, and are kept.
-LIVE ?= loft caustics house
+# The same with scenes that one relights in the browser, each one file; their demos take minutes each, and are kept.
+LIVE ?= loft caustics coin house
 site: setup-test $(PAGE)
 	$(BIN)/python -m scripts.live_pages $(LIVE)
 	$(MAKE) docs

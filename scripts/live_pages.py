@@ -11,14 +11,16 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from srbf.demo.tour import STOPS
 from srbf.io import files
 
 LARGEST = 10 << 20  # bytes
-SMALLER = {"loft": ("--budget", "13", "--error", "8%")}  # fits of demos whose own assets are larger: this one can be repainted
+OPTIONS = {"caustics": ("--transport", "indirect")}  # as `srbf demo` without a scene makes it
 LIST = "live.md"
 BESIDE = {
     "loft": "Carry a light through the door of a furnished room: shadows are crisp, bounces follow.",
-    "caustics": "A table under two glass rings, a ball and an angel of tinted glass: the article's figure 12. Move the sun.",
+    "caustics": "A table under two glass rings, a ball and an angel of tinted glass. Move the sun: direct light is drawn by shadow maps.",
+    "coin": "A struck coin, from 48 photographs under a light dome. Rake the light over it.",
     "house": "A room by daylight, seen by one camera. Move the sun around the house.",
 }
 
@@ -45,18 +47,19 @@ Each page is one file: open it here, or save it and open it from disk. It needs 
 
 {lines}
 
-`make site` made them from `make demo SCENE=...` on two cores; [how to use the page](viewer.md).
+`make site` made them from `srbf demo` on two cores; [how to use the page](viewer.md).
 """
+
+
+def demo_of(scene: str, demos: Path) -> Path:
+    """The folder of a scene's demo: in that of the demo of all scenes, if it is one of these."""
+    return demos / "demo" / scene if scene in {stop.name for stop in STOPS} else demos / scene
 
 
 def page_of(scene: str, demo: Path, folder: Path) -> LivePage:
     """Save the page of a demo; CalledProcessError where srbf says why it cannot."""
-    path, mesh, asset = folder / f"{scene}.html", demo / "scene.glb", demo / "asset"
-    if scene in SMALLER:
-        asset = folder.parent / scene / "asset"
-        if not (asset / "asset.json").is_file():
-            srbf("fit", str(demo / "capture"), "-o", str(asset), *SMALLER[scene])
-    srbf("view", str(asset), *(["--mesh", str(mesh)] if mesh.is_file() else []), "--save", str(path), "--force")
+    path, mesh = folder / f"{scene}.html", demo / "scene.glb"
+    srbf("view", str(demo / "asset"), *(["--mesh", str(mesh)] if mesh.is_file() else []), "--save", str(path), "--force")
     return LivePage(scene, path, path.stat().st_size)
 
 
@@ -76,9 +79,9 @@ def main() -> int:
     files.make_folder(folder)
     pages = []
     for scene in given.scenes:
-        demo = given.demos / scene
+        demo = demo_of(scene, given.demos)
         if not (demo / "asset" / "asset.json").is_file():
-            srbf("demo", "--scene", scene, "-o", str(demo))
+            srbf("demo", "--scene", scene, *OPTIONS.get(scene, ()), "-o", str(demo))
         pages.append(page_of(scene, demo, folder))
     files.write_text(given.output / LIST, text_of(pages))
     too_large = [f"{page.path} of {page.size / (1 << 20):.1f} MiB" for page in pages if page.size > LARGEST]

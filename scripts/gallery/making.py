@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import srbf
-from scripts.gallery import clip, drawing, photographs, point_lights, strip
+from scripts.gallery import clip, drawing, point_lights, strip
 from scripts.gallery.paths import ScenePaths
 from scripts.gallery.scenes import Fit, Lantern
 from scripts.gallery.steps import Steps
@@ -19,7 +19,7 @@ from srbf.asset import Asset
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings
 from srbf.capture import COVERED, Capture
-from srbf.demo import build_scene, scene_script
+from srbf.demo import build_scene, photographs, scene_script
 from srbf.errors import OutputExistsError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.evaluation.rate_distortion import Score, compared_methods, contest

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.settings import BakeSettings, Receiver, captures_of
+from srbf.demo.photographs import Dome
 from srbf.receiver_images import Transport
 from srbf.relighting.direct_light import Direct
 
@@ -29,15 +30,6 @@ class Fit:
     @property
     def direct(self) -> Direct:
         return "ray" if self.light == "indirect" else "none"
-
-
-@dataclass(frozen=True)
-class Dome:
-    """A photographer's light dome: `point_lights` to fit and `tests` to hold out, all above the elevation `lowest` (degrees)."""
-
-    point_lights: int
-    tests: int
-    lowest: float
 
 
 @dataclass(frozen=True)

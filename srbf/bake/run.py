@@ -73,7 +73,8 @@ class Bake:
     pool
         The workers of this machine.
     time_limit
-        Seconds after which no further light is begun; None: no limit.
+        Seconds after which no further light is begun; None: no limit. 0 of surfels: a capture of form factors, to which another run
+        adds the lights.
     keep_accumulation
         Keep the accumulation folder of a finished bake, so that samples can be added later.
     dask
@@ -302,6 +303,8 @@ class _Passes:
             )
         if self._is_time_up() and (self._tasks() or not self._settled):
             reached = [self._accumulation.samples(light) for light in self._lights if light.role == "train"]
+            if self._bake.time_limit == 0:
+                return
             self._reporter.say(
                 f"the time is up at {min(reached)} to {max(reached)} samples per texel; the same command adds more"
                 if any(reached)

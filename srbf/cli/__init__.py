@@ -21,7 +21,7 @@ COMMANDS = {  # where each is, and what the list of commands says of it
     "mesh": ("srbf.cli.mesh:mesh", "Write a Blender scene as one .glb."),
     "view": ("srbf.cli.view:view", "Show an asset in the browser and move its lights."),
     "info": ("srbf.cli.info:info", "Print what a capture or an asset holds."),
-    "demo": ("srbf.cli.demo:demo", "Bake, fit and report a scene that comes with srbf."),
+    "demo": ("srbf.cli.demo:demo", "Bake and fit scenes that come with srbf, and write pages to relight them."),
 }
 
 

@@ -11,17 +11,25 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from numpy import ndarray
+
+from srbf.asset import Asset
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
+from srbf.demo.pictures import direct_light, shown_bytes
 from srbf.errors import BakeError, InputError, MissingLibraryError, OutputExistsError
 from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.export.scene_mesh import write_scene_mesh
 from srbf.fitting.auto_method import within_budget
 from srbf.io import files
+from srbf.lights import DirectionalLight
 from srbf.methods import FitRun
+from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.relighting_map import RelightingMap
-from srbf.receiver_images import Quantity
+from srbf.receiver_images import Quantity, Transport
+from srbf.relighting.direct_light import Direct
+from srbf.relighting.relight import relight
 from srbf.report import write_report
 
 
@@ -34,14 +42,16 @@ class DemoScene:
     quantity: Quantity
     published: tuple[int, int]
 
-    def settings(self, lights: int, quality: Quality) -> BakeSettings:
-        """A `draft` takes a minute or two. `publish` has more texels, twice the samples, and on a lightmap a sun as wide as the mean light
-        spacing, the sharpest shadows that so many lights resolve."""
+    def settings(self, lights: int, quality: Quality, transport: Transport = "combined") -> BakeSettings:
+        """A `draft` takes a minute or two. `publish` has more texels, twice the samples, and on a lightmap of combined transport a sun as
+        wide as the mean light spacing, the sharpest shadows that so many lights resolve."""
         draft = BakeSettings(self.receiver, *self.size, lights=lights, holdout_samples=HOLDOUT_SAMPLES, quantity=self.quantity)
+        if transport == "indirect":
+            draft = replace(draft, transport=transport, validation=0, holdout=SPLIT_HOLDOUT)  # nothing is chosen by validation lights
         if quality == "draft":
             return draft
         finer = replace(draft, width=self.published[0], height=self.published[1], samples=SAMPLES)
-        return finer.with_matched_sun() if self.receiver.kind == "lightmap" else finer
+        return finer.with_matched_sun() if self.receiver.kind == "lightmap" and transport == "combined" else finer
 
 
 Quality = Literal["draft", "publish"]
@@ -49,6 +59,11 @@ SAMPLES = 4  # of `publish`
 MAPS = 25  # of the article's asset, beside the smallest good one
 FINE_MAPS = 100  # as bytes, of `publish`: no cluster borders and little blur, at 400 bytes per texel
 HOLDOUT_SAMPLES = 24  # fewer than a bake's default, enough for both scenes, to finish in minutes
+DIRECTIONS = 400
+SPLIT_DIRECTIONS = 144  # with direct light apart: what is left has no sharp edges
+SPLIT_HOLDOUT = 8
+SPLIT_FIT = ClusteredEigenMap(components=12, clusters=32, encoding="uint8")  # its tables of lights fit a page of 10 MiB
+SUN = DirectionalLight((-0.45, -0.5, 0.74))  # of a picture
 SCENES = {
     "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance", (512, 512)),
     "house": DemoScene(Receiver("view"), (256, 192), "radiance", (512, 384)),
@@ -99,21 +114,50 @@ def bake_once(bake: Bake, reporter: Reporter) -> bool:
 
 @dataclass(frozen=True)
 class Demo:
-    """The results of a demo: the report's page, the assets (the first is shown first), their capture, a lightmap's scene, and a picture
-    in the scene's camera beside Cycles."""
+    """The results of a demo: the report's page, the assets (the first is shown first), their capture, a lightmap's scene, a picture in the
+    scene's camera beside Cycles, and its error in words."""
 
     page: Path
     assets: tuple[Path, ...]
     capture: Path
     mesh: Path | None
     picture: Path | None = None
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a page can show before errors are known: an asset, a lightmap's scene, and what draws a picture, sRGB bytes (H, W, 3)."""
+
+    asset: Path
+    mesh: Path | None
+    picture: Callable[[], ndarray]
+
+
+Progress = Callable[[int, int, str], None]
+Ready = Callable[[Shown], None]
+
+
+def not_shown(shown: Shown) -> None:
+    """What is ready is not looked at."""
 
 
 def run_demo(
-    name: str, folder: Path, lights: int, reporter: Reporter, progress: Callable[[int, int, str], None], quality: Quality = "draft"
+    name: str,
+    folder: Path,
+    lights: int | None,
+    reporter: Reporter,
+    progress: Progress,
+    quality: Quality = "draft",
+    transport: Transport = "combined",
+    ready: Ready = not_shown,
 ) -> Demo:
-    """Build, bake, fit, evaluate and report the scene `name` in `folder`. Another run resumes it."""
-    scene = SCENES[name]
+    """Build, bake, fit, evaluate and report the scene `name` in `folder`. Another run resumes it.
+
+    `lights`: directions, None for as many as the transport needs. `ready` is called once, as soon as the asset can be looked at.
+    """
+    scene, is_split = SCENES[name], transport == "indirect"
+    lights = lights or (SPLIT_DIRECTIONS if is_split else DIRECTIONS)
     files.make_folder(folder)
     blend, capture_folder, asset_folder = folder / f"{name}.blend", folder / "capture", folder / "asset"
     timings: dict[str, float] = {}
@@ -122,35 +166,51 @@ def run_demo(
     if not blend.is_file():
         reporter.say(f"building {blend}")
         build_scene(name, blend)
-    settings = scene.settings(lights, quality)
+    settings = scene.settings(lights, quality, transport)
     reporter.say(f"baking {lights} directions at {settings.width}x{settings.height} with Cycles")
     if bake_once(Bake(blend, capture_folder, settings), reporter):
         timings["bake"] = clock() - started
     capture = Capture.open(capture_folder)
     started = clock()
-    method = within_budget(capture, say=reporter.say)
+    method = SPLIT_FIT if is_split else within_budget(capture, say=reporter.say)
     watch = TrainErrorAccumulator(capture)
     asset = method.encode(capture, FitRun(lambda done, total: progress(done, total, "fit"), watch.look))
     timings["fit"] = clock() - started
-    started = clock()
-    errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), watch=watch)
-    asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
-    timings["evaluate"] = clock() - started
     asset.save(asset_folder, force=True)
-    fits = {"maps": RelightingMap(k=MAPS)}
-    if quality == "publish":
-        fits = {"fine": RelightingMap(k=FINE_MAPS, encoding="uint8"), **fits}
-    for fit, maps in fits.items():
-        maps.encode(capture).save(folder / fit, force=True)
     mesh = None
     if scene.receiver.kind == "lightmap":
         mesh = folder / "scene.glb"
         write_scene_mesh(blend, mesh, capture_folder, force=True, say=reporter.say)
+    direct = direct_light() if is_split else "none"
+    ready(Shown(asset_folder, mesh, lambda: under_sun(asset, direct)))
+    started = clock()
+    errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), watch=watch)
+    whole = errors
+    if is_split:
+        whole = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), direct=direct, roles=("holdout",))
+    asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
+    timings["evaluate"] = clock() - started
+    asset.save(asset_folder, force=True)
+    fits = {} if is_split else {"maps": RelightingMap(k=MAPS)}
+    if quality == "publish" and not is_split:
+        fits = {"fine": RelightingMap(k=FINE_MAPS, encoding="uint8"), **fits}
+    for fit, maps in fits.items():
+        maps.encode(capture).save(folder / fit, force=True)
     reporter.say("drawing the report")
     files.make_folder(folder / "report")
-    page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder)
-    holdout, size = asset.manifest["error"]["holdout"], asset.bytes_per_texel()["directional"]
-    reporter.say(f"held-out PSNR {holdout['psnr']:.2f} dB, relative RMSE {holdout['relative_rmse']:.3f}, at {size} bytes per texel")
+    compared = () if is_split and quality == "draft" else None  # other methods take longer to fit than all else here
+    page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder, methods=compared)
+    holdout, size = whole["holdout"], asset.bytes_per_texel()["directional"]
+    with_direct = ", direct light included" if is_split else ""
+    reporter.say(
+        f"held-out PSNR {holdout['psnr']:.2f} dB, relative RMSE {holdout['relative_rmse']:.3f}{with_direct}, at {size} bytes per texel"
+    )
     assets = [folder / fit for fit in fits]
-    assets.insert(1 if quality == "publish" else 0, asset_folder)
-    return Demo(page, tuple(assets), capture_folder, mesh)
+    assets.insert(1 if "fine" in fits else 0, asset_folder)
+    found = f"{settings.holdout} held-out suns by Cycles: relative RMSE {100 * holdout['relative_rmse']:.1f} %, {holdout['psnr']:.1f} dB"
+    return Demo(page, tuple(assets), capture_folder, mesh, error=found)
+
+
+def under_sun(asset: Asset, direct: Direct, sun: DirectionalLight = SUN) -> ndarray:
+    """A picture of an asset of distant lights, sRGB bytes (H, W, 3)."""
+    return shown_bytes(relight(asset, [sun], direct=direct))

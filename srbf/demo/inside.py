@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,29 +14,28 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.scene_query import objects_of, with_light_set
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
-from srbf.demo import Demo, Quality, bake_once, build_scene
-from srbf.demo.pictures import in_camera
-from srbf.errors import ShaderError
+from srbf.demo import Demo, Progress, Quality, Ready, Shown, bake_once, build_scene, not_shown
+from srbf.demo.pictures import InCamera, Place, direct_light, shown_bytes
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.export.scene_mesh import write_scene_mesh
-from srbf.fitting.auto_method import within_budget
-from srbf.gl.context import create_context
 from srbf.io import files
 from srbf.methods import FitRun
-from srbf.relighting.direct_light import Direct
+from srbf.methods.transfer import Transfer
 from srbf.report import write_report
 
-BUDGET = 13  # bytes per texel
 PICTURE = "beside_cycles.png"
-Place = tuple[float, float, float]
+FIT = Transfer(clusters=256, components=12, editable=True)  # 13 bytes per texel
 
 
 @dataclass(frozen=True)
 class Amount:
-    """How much of a quality: texels per side, surfels, held-out lights, samples of those and of pictures, pixels of a picture."""
+    """How much of a quality: texels per side, surfels at most and how far apart (m; None: as many as there may be), the fit, held-out
+    lights, samples of those and of pictures, pixels of a picture."""
 
     size: int
     surfels: int
+    spacing: float | None
+    fit: Transfer
     holdout: int
     samples: int
     view: tuple[int, int]
@@ -70,7 +68,7 @@ class InsideScene:
             holdout=amount.holdout,
             holdout_samples=amount.samples,
             transport="indirect",
-            light_set=CloudSet("surfels", amount.surfels),
+            light_set=CloudSet("surfels", amount.surfels, amount.spacing),
         )
 
     def view(self, quality: Quality) -> BakeSettings:
@@ -87,15 +85,21 @@ INSIDE = {
         "atlas",
         ("--unlit", "--diffuse"),
         ((2.9, 2.3, 1.6), (5.0, 2.55, 1.3), (6.6, 2.4, 1.4)),
-        Amount(256, SURFELS, 6, 64, (360, 270)),
-        Amount(512, MOST_SURFELS, 12, 256, (800, 600)),
+        Amount(256, SURFELS, 0.3, replace(FIT, clusters=128, rank=256, surfels=1500), 2, 32, (320, 240)),
+        Amount(512, MOST_SURFELS, None, FIT, 12, 256, (800, 600)),
     )
 }
 
 
-def run_demo_inside(name: str, folder: Path, reporter: Reporter, progress: Callable[[int, int, str], None], quality: Quality) -> Demo:
-    """Build, bake, fit, evaluate, report and draw the scene `name` in `folder`. Another run resumes it."""
+def run_demo_inside(
+    name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality = "draft", ready: Ready = not_shown
+) -> Demo:
+    """Build, trace, fit, then have Cycles render what it is measured by, and report and draw the scene `name` in `folder`.
+
+    Another run resumes it. `ready` is called once, as soon as the asset can be looked at: before Cycles renders a light.
+    """
     scene = INSIDE[name]
+    amount = scene.amount(quality)
     files.make_folder(folder)
     blend, capture_folder, asset_folder = folder / f"{name}.blend", folder / "capture", folder / "asset"
     timings: dict[str, float] = {}
@@ -106,58 +110,51 @@ def run_demo_inside(name: str, folder: Path, reporter: Reporter, progress: Calla
         build_scene(name, blend, scene.options)
     receivers = objects_of(blend, [scene.collection], reporter.say)
     settings = scene.settings(receivers, quality)
-    reporter.say(
-        f"tracing form factors for {settings.width}x{settings.height} texels of {len(receivers)} objects; "
-        f"{settings.holdout} held-out lights with Cycles"
-    )
-    if bake_once(with_light_set(Bake(blend, capture_folder, settings), reporter.say), reporter):
-        timings["bake"] = clock() - started
-    capture = Capture.open(capture_folder)
+    reporter.say(f"tracing form factors for {settings.width}x{settings.height} texels of {len(receivers)} objects")
+    bake = with_light_set(Bake(blend, capture_folder, settings), reporter.say)
+    if bake_once(replace(bake, time_limit=0.0), reporter):
+        timings["form factors"] = clock() - started
     started = clock()
-    method = within_budget(capture, BUDGET, say=reporter.say, editable=True)
-    asset = method.encode(capture, FitRun(lambda done, total: progress(done, total, "fit")))
+    asset = amount.fit.encode(Capture.open(capture_folder), FitRun(lambda done, total: progress(done, total, "fit"), say=reporter.say))
     timings["fit"] = clock() - started
+    asset.save(asset_folder, force=True)
+    mesh = folder / "scene.glb"
+    write_scene_mesh(blend, mesh, capture_folder, force=True, say=reporter.say)
+    direct, view = direct_light(), scene.view(quality)
+
+    def in_camera() -> InCamera:
+        bake_once(Bake(blend, folder / "view", view), reporter)
+        return InCamera(asset, Capture.open(folder / "view"), direct)
+
+    ready(Shown(asset_folder, mesh, lambda: shown_bytes(in_camera().pictures(scene.places[:1])[0])))
     started = clock()
-    direct = direct_light()
+    reporter.say(f"rendering {settings.holdout} held-out lights and {len(scene.places)} pictures with Cycles")
+    if bake_once(bake, reporter):
+        timings["held-out lights"] = clock() - started
+    started = clock()
+    references = render_point_lights(
+        blend, view, np.array(scene.places), amount.samples, progress=lambda done, total: progress(int(done), int(total), "Cycles")
+    )
+    compared = in_camera().beside(scene.places, references, folder / PICTURE)
+    timings["pictures"] = clock() - started
+    started = clock()
+    capture = Capture.open(capture_folder)
     errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"))
     whole = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), direct=direct)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     timings["evaluate"] = clock() - started
     asset.save(asset_folder, force=True)
-    mesh = folder / "scene.glb"
-    write_scene_mesh(blend, mesh, capture_folder, force=True, say=reporter.say)
-    started = clock()
-    reporter.say("drawing pictures beside Cycles")
-    view = scene.view(quality)
-    bake_once(Bake(blend, folder / "view", view), reporter)
-    samples = scene.amount(quality).samples
-    references = render_point_lights(
-        blend, view, np.array(scene.places), samples, progress=lambda done, total: progress(int(done), int(total), "Cycles")
-    )
-    compared = in_camera(asset, Capture.open(folder / "view"), scene.places, references, direct, folder / PICTURE)
-    timings["pictures"] = clock() - started
     reporter.say("drawing the report")
     files.make_folder(folder / "report")
     page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder)
     held_out, on_disk = errors["holdout"], sum(path.stat().st_size for path in asset_folder.iterdir())
+    alone = f", their noise of {settings.holdout_samples} samples alone {100 * held_out['noise']:.1f} %" if "noise" in held_out else ""
     reporter.say(
-        f"held-out lights, the noise of {settings.holdout_samples} samples included: bounces {100 * held_out['relative_rmse']:.1f} % "
-        f"relative RMSE, with direct light {100 * whole['holdout']['relative_rmse']:.1f} % and PSNR {whole['holdout']['psnr']:.1f} dB; "
+        f"held-out lights: bounces {100 * held_out['relative_rmse']:.1f} % relative RMSE{alone}; with direct light "
+        f"{100 * whole['holdout']['relative_rmse']:.1f} % and PSNR {whole['holdout']['psnr']:.1f} dB; "
         f"{asset.bytes_per_texel()['point']} bytes per texel, {on_disk / 1e6:.1f} MB"
     )
-    in_pictures = ", ".join(f"{100 * one.relative_rmse:.1f} %" for one in compared)
-    reporter.say(f"in the camera, direct light included: relative RMSE {in_pictures}; {', '.join(_seconds(timings))}")
-    return Demo(page, (asset_folder,), capture_folder, mesh, folder / PICTURE)
-
-
-def direct_light() -> Direct:
-    """By shadow maps as in engines; by rays where there is no OpenGL."""
-    try:
-        create_context().release()
-    except ShaderError:
-        return "ray"
-    return "shadow-map"
-
-
-def _seconds(timings: dict[str, float]) -> list[str]:
-    return [f"{name} {seconds:.0f} s" for name, seconds in timings.items()]
+    in_pictures = ", ".join(f"{100 * one.relative_rmse:.1f}" for one in compared)
+    found = f"{len(compared)} lights in its camera by Cycles: relative RMSE {in_pictures} %, noise included"
+    reporter.say(f"{found}; {', '.join(f'{step} {seconds:.0f} s' for step, seconds in timings.items())}")
+    return Demo(page, (asset_folder,), capture_folder, mesh, folder / PICTURE, found)

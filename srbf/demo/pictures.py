@@ -15,7 +15,8 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float, Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.errors import InputError
+from srbf.errors import InputError, ShaderError
+from srbf.gl.context import create_context
 from srbf.io.scene_glb import read_triangles
 from srbf.lights import PointLight, triple
 from srbf.methods import linear_response
@@ -27,51 +28,82 @@ WIDTH = 460  # of a picture on the sheet, in 1/100 inch
 GAP, HEADER, LABEL = 14, 84, 30
 WHITE = 0.97  # quantile of Cycles' picture that is shown as LEVEL
 LEVEL = 0.8
+Place = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Compared:
     """Where a light is (m), and the relative RMSE of the picture over pixels that show receivers; the noise of Cycles counts as error."""
 
-    place: tuple[float, float, float]
+    place: Place
     relative_rmse: float
 
 
-def in_camera(
-    asset: Asset, view: Capture, places: Sequence[tuple[float, float, float]], references: Sequence[ndarray], direct: Direct, path: Path
-) -> list[Compared]:
-    """Draw the asset in the camera of `view`, a capture of the scene with its geometry, beside `references`, radiance in it, to a PNG.
+class InCamera:
+    """An asset in the camera of `view`, a capture of the scene with its geometry, under points of unit irradiance at 1 m.
 
-    Lights are points of unit irradiance at 1 m. InputError where the asset has no lightmap coordinates, or the view no pinhole camera.
+    InputError where the asset has no lightmap coordinates, or the view no pinhole camera or no albedo.
     """
-    texels = lightmap_coordinates(asset, view)
-    albedo = view.geometry("albedo")
-    if albedo is None:
-        raise InputError(f"expected the albedo of the view in {view.folder}, found none; bake it with transport indirect")
-    receivers = np.isfinite(texels[..., 0])
-    height = WIDTH * view.height / view.width
-    sheet = Sheet(
-        2 * MARGIN + 2 * WIDTH + GAP,
-        HEADER + len(places) * (height + LABEL) + 10,
-        "A light carried through the scene",
-        "Left: direct light per pixel, and bounces from the asset. Right: Cycles. No light was captured; each row has one exposure.",
-    )
-    results = []
-    with Added(view, direct) as added:
-        for row, (place, reference) in enumerate(zip(places, references, strict=True)):
-            light = PointLight(triple(np.array(place)), falloff="inverse-square")
-            bounced = bilinear(linear_response(asset, [light]), texels) * albedo / np.float32(np.pi)
-            own = added.response([light])
-            picture = np.maximum(np.where(receivers[..., None], bounced, 0) + (0 if own is None else own), 0).astype(np.float32)
-            error = _relative(picture[receivers], reference[receivers])
+
+    def __init__(self, asset: Asset, view: Capture, direct: Direct) -> None:
+        albedo = view.geometry("albedo")
+        if albedo is None:
+            raise InputError(f"expected the albedo of the view in {view.folder}, found none; bake it with transport indirect")
+        self._asset, self._view, self._direct, self._albedo = asset, view, direct, albedo
+        self._texels = lightmap_coordinates(asset, view)
+        self.receivers: Bool[ndarray, "H W"] = np.isfinite(self._texels[..., 0])
+
+    def pictures(self, places: Sequence[Place]) -> list[Float32[ndarray, "H W 3"]]:
+        """Radiance with the light at each place (m): direct light per pixel, and bounces from the lightmap."""
+        found = []
+        with Added(self._view, self._direct) as added:
+            for place in places:
+                light = PointLight(triple(np.array(place)), falloff="inverse-square")
+                bounced = bilinear(linear_response(self._asset, [light]), self._texels) * self._albedo / np.float32(np.pi)
+                own = added.response([light])
+                picture = np.where(self.receivers[..., None], bounced, 0) + (0 if own is None else own)
+                found.append(np.maximum(picture, 0).astype(np.float32))
+        return found
+
+    def beside(self, places: Sequence[Place], references: Sequence[ndarray], path: Path) -> list[Compared]:
+        """Draw the pictures beside `references`, radiance in the view, to a PNG."""
+        height = WIDTH * self._view.height / self._view.width
+        sheet = Sheet(
+            2 * MARGIN + 2 * WIDTH + GAP,
+            HEADER + len(places) * (height + LABEL) + 10,
+            "A light carried through the scene",
+            "Left: direct light per pixel, and bounces from the asset. Right: Cycles. No light was captured; each row has one exposure.",
+        )
+        results = []
+        for row, (place, picture, reference) in enumerate(zip(places, self.pictures(places), references, strict=True)):
+            error = _relative(picture[self.receivers], reference[self.receivers])
             results.append(Compared(place, error))
-            gain = LEVEL / max(float(np.quantile(reference, WHITE)), 1e-30)
+            gain = gain_of(reference)
             y = HEADER + row * (height + LABEL)
             words = (f"point light at {place_text(place)} m", f"Cycles; relative RMSE {100 * error:.1f} %, its noise included")
             for column, (pixels, label) in enumerate(zip((picture, reference), words, strict=True)):
                 sheet.image(MARGIN + column * (WIDTH + GAP), y, WIDTH, height, shown(pixels, gain), label)
-    sheet.save(path)
-    return results
+        sheet.save(path)
+        return results
+
+
+def direct_light() -> Direct:
+    """By shadow maps as in engines; by rays where there is no OpenGL."""
+    try:
+        create_context().release()
+    except ShaderError:
+        return "ray"
+    return "shadow-map"
+
+
+def gain_of(pixels: Float[ndarray, "H W 3"]) -> float:
+    """The exposure that shows the bright parts of linear pixels as LEVEL."""
+    return LEVEL / max(float(np.quantile(pixels, WHITE)), 1e-30)
+
+
+def shown_bytes(pixels: Float[ndarray, "H W 3"]) -> ndarray:
+    """Linear pixels as sRGB bytes (H, W, 3) at an exposure of their own."""
+    return np.round(np.clip(shown(pixels, gain_of(pixels)), 0, 1) * 255).astype(np.uint8)
 
 
 def lightmap_coordinates(asset: Asset, view: Capture) -> Float32[ndarray, "H W 2"]:

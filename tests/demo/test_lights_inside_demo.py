@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -65,15 +66,19 @@ def test_directions_mean_nothing_inside(tmp_path: Path) -> None:
 def test_a_loft_from_script_to_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("embreex")
     loft = INSIDE["loft"]
-    small = replace(loft, places=loft.places[:1], draft=Amount(48, 600, 1, 4, (40, 30)))
-    monkeypatch.setattr(inside, "INSIDE", {"loft": small})
     few = replace(Transfer(), clusters=4, surfels=800, rank=48, editable=True)
-    monkeypatch.setattr(inside, "within_budget", lambda *_args, **_named: few)  # has tests of its own
+    small = replace(loft, places=loft.places[:1], draft=Amount(48, 600, 0.8, few, 1, 4, (40, 30)))
+    monkeypatch.setattr(inside, "INSIDE", {"loft": small})
     monkeypatch.setattr(inside, "write_report", lambda *_args, **_named: tmp_path / "index.html")  # has tests of its own
     for name in ("PLACED", "MOST_PLACED", "NEAR", "SPOTS"):
         monkeypatch.setattr(transfer_basis, name, 40)
-    done = CliRunner().invoke(app, ["demo", "--scene", "loft", "-o", str(tmp_path)])
+    seen: list[list[Path]] = []
+    shown = partial(inside.run_demo_inside, ready=lambda own: seen.append([*(tmp_path / "capture" / "lights").iterdir(), own.asset]))
+    with monkeypatch.context() as patch:
+        patch.setattr(inside, "run_demo_inside", shown)
+        done = CliRunner().invoke(app, ["demo", "--scene", "loft", "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
+    assert seen == [[tmp_path / "asset"]], "it can be looked at before Cycles renders a light"
     assert f"srbf view {tmp_path / 'asset'} {tmp_path / 'capture'} --mesh {tmp_path / 'scene.glb'}" in done.output
     asset = Asset.open(tmp_path / "asset")
     assert {"Picture", "Walls", "Floor", "Partition"} <= set(Surfaces.of(asset).names)

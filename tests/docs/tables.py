@@ -42,7 +42,8 @@ SHORTER = {
     "srbf bake --light-set cubemap:32 *": "--light-set cubemap:8 --size 24 --validation 4 --holdout 2",
     "srbf bake --lights auto *": f"--size 24 {TESTED} --error 90%",
     "srbf bake *": FEW,
-    "srbf demo *": "--lights 28",  # its scenes are made smaller, too
+    "srbf demo --scene caustics *": "--lights 28",  # its scenes are made smaller, too
+    "srbf demo --scene house *": "--lights 28",
     "srbf evaluate --leave-one-out *": "-k 4 --spread mean --ridge 0.1",
     "srbf evaluate --point-reference *": "--point-reference 2 --samples 1",
     "srbf fit --method neural-map *": "--steps 2",
@@ -72,6 +73,8 @@ ELSEWHERE = {
     "blender --command srbf bake *": "tests/extension/test_extension.py::test_the_command_bakes_the_open_file",
     "blender --command srbf fit *": "tests/extension/test_extension.py::test_what_the_command_adds",
     "srbf demo --scene loft *": "tests/demo/test_lights_inside_demo.py::test_a_loft_from_script_to_picture",
+    "srbf demo -o out/demo": "tests/demo/test_tour.py::test_the_index_grows_by_a_scene_at_a_time",
+    "srbf demo -o FOLDER": "tests/demo/test_tour.py::test_the_index_grows_by_a_scene_at_a_time",
     "srbf view --scene *": "tests/extension/test_light_this_shot.py::test_a_true_shot_is_served",
     "srbf relight --scene-lights *": "tests/bake/test_scene_lights.py::test_relighting_by_them_is_what_cycles_renders",
     "srbf relight --scene-lights --reference *": "tests/bake/test_scene_lights.py::test_a_relit_picture_is_compared_with_cycles",

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy import ndarray
 from PIL import Image
 
-from scripts.gallery.scenes import Dome
 from srbf.arrays import Float64
 from srbf.capture import Capture
 from srbf.io import files
@@ -18,6 +18,15 @@ from srbf.sphere import point_set, random_directions
 POINT_LIGHTS, DIRS, TEST = "point_lights.lp", "dirs.lp", "test.lp"
 QUALITY = 95  # of the JPEGs
 WHITE_QUANTILE = 0.998  # of the pixels of all photographs; it becomes white
+
+
+@dataclass(frozen=True)
+class Dome:
+    """A photographer's light dome: `point_lights` to fit and `tests` to hold out, all above the elevation `lowest` (degrees)."""
+
+    point_lights: int
+    tests: int
+    lowest: float
 
 
 def dome_directions(dome: Dome) -> Float64[ndarray, "L 3"]:

@@ -1,0 +1,165 @@
+"""The demo without a scene: three scenes one after the other, each with a page of one file, and an index that grows as they are made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import srbf
+from srbf.bake.run import Reporter
+from srbf.demo import Demo, Progress, Quality, Ready, Shown, run_demo, scene_script
+from srbf.demo.dome import run_demo_dome
+from srbf.demo.index_page import Card, data_uri, index_page
+from srbf.demo.inside import run_demo_inside
+from srbf.errors import SrbfError
+from srbf.io import files
+from srbf.viewer.built_page import page_files
+from srbf.viewer.contents import contents_of
+from srbf.viewer.single_file import single_file
+
+INDEX = "index.html"
+KEPT = "card.json"  # of a finished scene
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A scene of the tour: its name is that of its folder and of its page, `opens` the state that the page opens with."""
+
+    name: str
+    title: str
+    sentence: str
+    opens: dict[str, Any]
+    make: Callable[[str, Path, Reporter, Progress, Quality, Ready], Demo]
+
+    def card(self) -> Card:
+        """What the index says before anything is made."""
+        return Card(self.title, self.sentence, self.opens)
+
+
+def _split(name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality, ready: Ready) -> Demo:
+    return run_demo(name, folder, None, reporter, progress, quality, "indirect", ready)
+
+
+def _sun(x: float, y: float, z: float, intensity: float) -> dict[str, Any]:
+    return {"kind": "directional", "on": True, "color": "#fff0dc", "intensity": intensity, "direction": [x, y, z]}
+
+
+def _point(x: float, y: float, z: float, intensity: float) -> dict[str, Any]:
+    own = {"position": [x, y, z], "a0": 1, "falloff": "inverse-square", "radius": 0.001}
+    return {"kind": "point", "on": True, "color": "#ffe2bd", "intensity": intensity, **own}
+
+
+STOPS = (
+    Stop(
+        "loft",
+        "Carry a light through a loft",
+        "Drag the light through the door: its shadows stay crisp, and its bounces follow.",
+        {"lights": [_point(3.3, 2.9, 1.5, 2)], "tone": "agx"},
+        run_demo_inside,
+    ),
+    Stop(
+        "caustics",
+        "Move the sun over colored glass",
+        "Drag the sun on the disc: light falls through the glass in color, and the pawn's shadow stays sharp.",
+        {"lights": [_sun(-0.45, -0.5, 0.74, 1.1)], "tone": "agx"},
+        _split,
+    ),
+    Stop(
+        "coin",
+        "Rake light over a coin",
+        "Drag the light toward the rim of the disc: every letter and scratch of the photographed coin throws its shadow.",
+        {"lights": [_sun(-0.62, 0.55, 0.56, 1.0)]},
+        run_demo_dome,
+    ),
+)
+
+
+def run_tour(folder: Path, reporter: Reporter, progress: Progress, quality: Quality = "draft") -> list[str]:
+    """Make the scenes of STOPS, each in a folder of its own; returns a line for each that failed, and goes on with the next.
+
+    The index is there, and its path is said, as soon as the first scene can be opened. Finished scenes are kept, others resumed.
+    MissingLibraryError where the scenes or the built page are not installed.
+    """
+    page_files()
+    for stop in STOPS:
+        scene_script(stop.name)
+    files.make_folder(folder)
+    tour = _Tour(folder, reporter, progress, quality)
+    failures = [line for number in range(len(STOPS)) if (line := tour.visit(number))]
+    tour.write(grows=False)
+    return failures
+
+
+class _Tour:
+    """One run: the cards of its scenes, and the index that shows them."""
+
+    def __init__(self, folder: Path, reporter: Reporter, progress: Progress, quality: Quality) -> None:
+        self._folder, self._reporter, self._progress, self._quality = folder, reporter, progress, quality
+        self._cards = [stop.card() for stop in STOPS]
+        self._is_said = False
+
+    def write(self, grows: bool = True) -> None:
+        """The index as it is now; says where it is once there is a link on it."""
+        files.write_text(self._folder / INDEX, index_page(self._cards, grows))
+        if not self._is_said and any(card.page for card in self._cards):
+            self._is_said = True
+            self._reporter.say(f"open {self._folder / INDEX}: one scene can be relit now, the others follow on the same page")
+
+    def visit(self, number: int) -> str:
+        """Make a scene, or keep it where it is finished; why it failed, or nothing."""
+        stop, card = STOPS[number], self._cards[number]
+        kept = self._kept(stop)
+        if kept is not None:
+            self._cards[number] = kept
+            self.write()
+            return ""
+        card.note, line = "Being made now.", ""
+        self.write()
+
+        def say(told: str) -> None:
+            self._reporter.say(f"{stop.name}: {told}")
+
+        reporter = Reporter(self._reporter.progress, say)
+        try:
+            made = stop.make(stop.name, self._folder / stop.name, reporter, self._progress, self._quality, partial(self._show, stop, card))
+        except Exception as error:  # noqa: BLE001  whatever it is, the other scenes can still be made
+            line = f"{stop.name} failed: {_in_one_line(error)}"
+            card.note, card.failed = line, True
+            self._reporter.say(line)
+        else:
+            card.note = f"{made.error[0].upper()}{made.error[1:]}."
+            files.write_json(self._folder / stop.name / KEPT, self._record(card))
+        self.write()
+        return line
+
+    def _show(self, stop: Stop, card: Card, shown: Shown) -> None:
+        """Write the page of a scene, then its picture on the index."""
+        files.write_text(self._folder / f"{stop.name}.html", single_file(contents_of([shown.asset], None, shown.mesh)))
+        card.page, card.note = f"{stop.name}.html", "Its errors are being measured."
+        self.write()
+        card.picture = data_uri(shown.picture())
+        self.write()
+
+    def _kept(self, stop: Stop) -> Card | None:
+        """The card of a scene that is finished and whose page is there."""
+        path = self._folder / stop.name / KEPT
+        if not path.is_file() or not (self._folder / f"{stop.name}.html").is_file():
+            return None
+        with suppress(SrbfError, KeyError, TypeError):
+            found = files.read_json(path)
+            card = Card(**found["card"])
+            if found == self._record(card):
+                return replace(card, title=stop.title, sentence=stop.sentence, opens=stop.opens)
+        return None
+
+    def _record(self, card: Card) -> dict[str, Any]:
+        return {"srbf": srbf.__version__, "quality": self._quality, "card": asdict(card)}
+
+
+def _in_one_line(error: Exception) -> str:
+    kind = "" if isinstance(error, SrbfError) else f"{type(error).__name__} "
+    return kind + " ".join(str(error).split())
