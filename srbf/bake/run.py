@@ -302,9 +302,9 @@ class _Passes:
                 f"the others are in {self._folder}, and the same command tries the failed ones again"
             )
         if self._is_time_up() and (self._tasks() or not self._settled):
-            reached = [self._accumulation.samples(light) for light in self._lights if light.role == "train"]
             if self._bake.time_limit == 0:
                 return
+            reached = [self._accumulation.samples(light) for light in self._lights if light.role == "train"]
             self._reporter.say(
                 f"the time is up at {min(reached)} to {max(reached)} samples per texel; the same command adds more"
                 if any(reached)

@@ -22,6 +22,7 @@ from srbf.errors import BakeError, InputError, MissingLibraryError, OutputExists
 from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.export.scene_mesh import write_scene_mesh
 from srbf.fitting.auto_method import within_budget
+from srbf.fitting.options import encode
 from srbf.io import files
 from srbf.lights import DirectionalLight
 from srbf.methods import FitRun
@@ -174,7 +175,7 @@ def run_demo(
     started = clock()
     method = SPLIT_FIT if is_split else within_budget(capture, say=reporter.say)
     watch = TrainErrorAccumulator(capture)
-    asset = method.encode(capture, FitRun(lambda done, total: progress(done, total, "fit"), watch.look))
+    asset = encode(method, capture, FitRun(lambda done, total: progress(done, total, "fit"), watch.look, say=reporter.say))
     timings["fit"] = clock() - started
     asset.save(asset_folder, force=True)
     mesh = None

@@ -79,7 +79,7 @@ STOPS = (
 
 
 def run_tour(folder: Path, reporter: Reporter, progress: Progress, quality: Quality = "draft") -> list[str]:
-    """Make the scenes of STOPS, each in a folder of its own; returns a line for each that failed, and goes on with the next.
+    """Make the scenes of STOPS, each in a folder of its own; those after one that fails, too; returns a line for each failure.
 
     The index is there, and its path is said, as soon as the first scene can be opened. Finished scenes are kept, others resumed.
     MissingLibraryError where the scenes or the built page are not installed.
