@@ -12,7 +12,6 @@ from typing import Any
 from urllib.parse import quote
 
 from numpy import ndarray
-from PIL import Image
 
 QUALITY = 82  # of a picture
 REFRESH = 10  # seconds after which a page that grows is read again
@@ -67,6 +66,8 @@ def address(page: str, opens: dict[str, Any]) -> str:
 
 def data_uri(picture: ndarray) -> str:
     """sRGB bytes (H, W, 3) as an address that holds them."""
+    from PIL import Image
+
     held = io.BytesIO()
     Image.fromarray(picture).save(held, "WEBP", quality=QUALITY, method=6)
     return f"data:image/webp;base64,{base64.b64encode(held.getvalue()).decode('ascii')}"

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy import ndarray
-from PIL import Image
 
 from srbf.arrays import Float64
 from srbf.capture import Capture
@@ -58,6 +57,8 @@ def write_point_lights(path: Path, dome: Dome) -> None:
 
 def photograph(rendered: Path, dome: Dome, folder: Path) -> None:
     """Write every image of a baked dome as a JPEG with one exposure, and the light lists to fit and to test."""
+    from PIL import Image
+
     files.make_folder(folder)
     capture = Capture.open(rendered)
     everything = np.concatenate([image[::4, ::4].ravel() for image in map(capture.image, range(len(capture.lights)))])
