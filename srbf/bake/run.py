@@ -73,8 +73,7 @@ class Bake:
     pool
         The workers of this machine.
     time_limit
-        Seconds after which no further light is begun; None: no limit. 0 of surfels: a capture of form factors, to which another run
-        adds the lights.
+        Seconds after which no further light is begun; None: no limit. 0: form factors of surfels alone, another run adds lights.
     keep_accumulation
         Keep the accumulation folder of a finished bake, so that samples can be added later.
     dask
@@ -302,14 +301,10 @@ class _Passes:
                 f"the others are in {self._folder}, and the same command tries the failed ones again"
             )
         if self._is_time_up() and (self._tasks() or not self._settled):
-            if self._bake.time_limit == 0:
-                return
-            reached = [self._accumulation.samples(light) for light in self._lights if light.role == "train"]
-            self._reporter.say(
-                f"the time is up at {min(reached)} to {max(reached)} samples per texel; the same command adds more"
-                if any(reached)
-                else "the time was up before the first light was done; the same command resumes the bake"
-            )
+            if self._bake.time_limit:
+                self._reporter.say(
+                    stopping.time_is_up([self._accumulation.samples(light) for light in self._lights if light.role == "train"])
+                )
             return
         if self._shard is not None:
             return

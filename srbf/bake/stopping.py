@@ -1,4 +1,4 @@
-"""`samples=auto`: samples are added until the error on the validation lights, without their own noise, stops improving."""
+"""Where a bake stops: by its time, or, with `samples=auto`, once the validation lights' error, without their noise, stops improving."""
 
 from __future__ import annotations
 
@@ -28,6 +28,13 @@ class Measure:
     samples: int
     relative_rmse: float
     noise: float
+
+
+def time_is_up(samples: Sequence[int]) -> str:
+    """A line for a bake whose train lights have so many samples each."""
+    if not any(samples):
+        return "the time was up before the first light was done; the same command resumes the bake"
+    return f"the time is up at {min(samples)} to {max(samples)} samples per texel; the same command adds more"
 
 
 def measure(capture: Capture, samples: int, sums: Sequence[Sum]) -> Measure:

@@ -50,7 +50,7 @@ from srbf.visibility.embree import has_embree
 
 FRAMES_MARKER = "0000.exr"
 REFERENCE_SAMPLES = 64  # of Cycles, unless told
-BLACK = "the picture is black: no light reaches what it shows; look at the lights' places, in meters of the scene's world, and colors"
+BLACK = "the picture is black: no light reaches what it shows; check the lights' positions (m), directions and colors"
 Viewer = tuple[float, float, float] | None
 Shadows = Literal["ray", "pca"]
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from numpy import ndarray
 
@@ -63,7 +63,7 @@ HOLDOUT_SAMPLES = 24  # fewer than a bake's default, enough for both scenes, to 
 DIRECTIONS = 400
 SPLIT_DIRECTIONS = 144  # with direct light apart: what is left has no sharp edges
 SPLIT_HOLDOUT = 8
-SPLIT_FIT = ClusteredEigenMap(components=12, clusters=32, encoding="uint8")  # its tables of lights fit a page of 10 MiB
+PAGE_FIT = ClusteredEigenMap(components=12, clusters=32, encoding="uint8")  # its tables of lights fit a page of 10 MiB
 SUN = DirectionalLight((-0.45, -0.5, 0.74))  # of a picture
 SCENES = {
     "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance", (512, 512)),
@@ -101,6 +101,13 @@ def build_scene(name: str, path: Path, options: Sequence[str] = ()) -> None:
         lines = (finished.stderr or finished.stdout).strip().splitlines()
         raise BakeError(f"expected the scene {name} to build, found status {finished.returncode}: {lines[-1] if lines else 'no message'}")
     temporary.replace(path)
+
+
+def scene_file(name: str, path: Path, reporter: Reporter, options: Sequence[str] = ()) -> None:
+    """Build the scene at `path` unless it is there."""
+    if not path.is_file():
+        reporter.say(f"building {path}")
+        build_scene(name, path, options)
 
 
 def bake_once(bake: Bake, reporter: Reporter) -> bool:
@@ -164,16 +171,14 @@ def run_demo(
     timings: dict[str, float] = {}
     clock = time.perf_counter
     started = clock()
-    if not blend.is_file():
-        reporter.say(f"building {blend}")
-        build_scene(name, blend)
+    scene_file(name, blend, reporter)
     settings = scene.settings(lights, quality, transport)
     reporter.say(f"baking {lights} directions at {settings.width}x{settings.height} with Cycles")
     if bake_once(Bake(blend, capture_folder, settings), reporter):
         timings["bake"] = clock() - started
     capture = Capture.open(capture_folder)
     started = clock()
-    method = SPLIT_FIT if is_split else within_budget(capture, say=reporter.say)
+    method = PAGE_FIT if is_split else within_budget(capture, say=reporter.say)
     watch = TrainErrorAccumulator(capture)
     asset = encode(method, capture, FitRun(lambda done, total: progress(done, total, "fit"), watch.look, say=reporter.say))
     timings["fit"] = clock() - started
@@ -189,18 +194,13 @@ def run_demo(
     whole = errors
     if is_split:
         whole = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), direct=direct, roles=("holdout",))
-    asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     timings["evaluate"] = clock() - started
-    asset.save(asset_folder, force=True)
     fits = {} if is_split else {"maps": RelightingMap(k=MAPS)}
     if quality == "publish" and not is_split:
         fits = {"fine": RelightingMap(k=FINE_MAPS, encoding="uint8"), **fits}
     for fit, maps in fits.items():
-        maps.encode(capture).save(folder / fit, force=True)
-    reporter.say("drawing the report")
-    files.make_folder(folder / "report")
-    compared = () if is_split and quality == "draft" else None  # other methods take longer to fit than all else here
-    page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder, methods=compared)
+        encode(maps, capture, FitRun(say=reporter.say)).save(folder / fit, force=True)
+    page = reported(asset, capture, folder, errors, timings, reporter, not (is_split and quality == "draft"))
     holdout, size = whole["holdout"], asset.bytes_per_texel()["directional"]
     with_direct = ", direct light included" if is_split else ""
     reporter.say(
@@ -210,6 +210,28 @@ def run_demo(
     assets.insert(1 if "fine" in fits else 0, asset_folder)
     found = f"{settings.holdout} held-out suns by Cycles: relative RMSE {100 * holdout['relative_rmse']:.1f} %, {holdout['psnr']:.1f} dB"
     return Demo(page, tuple(assets), capture_folder, mesh, error=found)
+
+
+def reported(
+    asset: Asset,
+    capture: Capture,
+    folder: Path,
+    errors: dict[str, Any],
+    timings: dict[str, float],
+    reporter: Reporter,
+    compares: bool = True,
+) -> Path:
+    """The page of a report, drawn in `folder`, where the asset is kept with its errors.
+
+    `compares`: with other methods, whose fits take longer than the other steps of a draft.
+    """
+    asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
+    asset_folder, report = folder / "asset", folder / "report"
+    asset.save(asset_folder, force=True)
+    reporter.say("drawing the report")
+    files.make_folder(report)
+    methods = None if compares else ()
+    return write_report(asset, capture, report, evaluation=errors, timings=timings, asset_folder=asset_folder, methods=methods)
 
 
 def under_sun(asset: Asset, direct: Direct, sun: DirectionalLight = SUN) -> ndarray:

@@ -9,17 +9,14 @@ from pathlib import Path
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
-from srbf.demo import Demo, Progress, Quality, Ready, Shown, bake_once, build_scene, not_shown, under_sun
+from srbf.demo import PAGE_FIT, Demo, Progress, Quality, Ready, Shown, bake_once, not_shown, reported, scene_file, under_sun
 from srbf.demo.photographs import DIRS, POINT_LIGHTS, TEST, Dome, photograph, write_point_lights
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.importing.photographs import LightListImport
 from srbf.io import files
 from srbf.lights import DirectionalLight
 from srbf.methods import FitRun
-from srbf.methods.clustered_eigen_map import ClusteredEigenMap
-from srbf.report import write_report
 
-FIT = ClusteredEigenMap(components=12, clusters=32, encoding="uint8")  # its tables of lights fit a page of 10 MiB
 RAKING = DirectionalLight((-0.62, 0.55, 0.56))  # of a picture
 
 
@@ -64,9 +61,7 @@ def run_demo_dome(
     timings: dict[str, float] = {}
     clock = time.perf_counter
     started = clock()
-    if not blend.is_file():
-        reporter.say(f"building {blend}")
-        build_scene(name, blend)
+    scene_file(name, blend, reporter)
     write_point_lights(folder / POINT_LIGHTS, dome)
     reporter.say(f"taking {dome.point_lights + dome.tests} photographs of {taken.side}x{taken.side} with Cycles")
     if bake_once(Bake(blend, rendered, taken.settings(folder / POINT_LIGHTS)), reporter):
@@ -77,19 +72,14 @@ def run_demo_dome(
     timings["import"] = clock() - started
     started = clock()
     capture = Capture.open(folder / "capture")
-    asset = FIT.encode(capture, FitRun(lambda done, total: progress(done, total, "fit")))
+    asset = PAGE_FIT.encode(capture, FitRun(lambda done, total: progress(done, total, "fit")))
     timings["fit"] = clock() - started
     asset.save(asset_folder, force=True)
     ready(Shown(asset_folder, None, lambda: under_sun(asset, "none", RAKING)))
     started = clock()
     errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"))
-    asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     timings["evaluate"] = clock() - started
-    asset.save(asset_folder, force=True)
-    reporter.say("drawing the report")
-    files.make_folder(folder / "report")
-    compared = () if quality == "draft" else None  # other methods take longer to fit than all else here
-    page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder, methods=compared)
+    page = reported(asset, capture, folder, errors, timings, reporter, quality != "draft")
     holdout = errors["holdout"]
     found = f"{dome.tests} held-out photographs: relative RMSE {100 * holdout['relative_rmse']:.1f} %, {holdout['psnr']:.1f} dB"
     reporter.say(found)

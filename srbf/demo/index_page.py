@@ -48,6 +48,7 @@ class Card:
     picture: str = ""
     note: str = "Not begun yet."
     failed: bool = False
+    is_done: bool = False
 
     def html(self) -> str:
         """An article."""

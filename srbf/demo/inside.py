@@ -14,14 +14,13 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.scene_query import objects_of, with_light_set
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
-from srbf.demo import Demo, Progress, Quality, Ready, Shown, bake_once, build_scene, not_shown
+from srbf.demo import Demo, Progress, Quality, Ready, Shown, bake_once, not_shown, reported, scene_file
 from srbf.demo.pictures import InCamera, Place, direct_light, shown_bytes
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.export.scene_mesh import write_scene_mesh
 from srbf.io import files
 from srbf.methods import FitRun
 from srbf.methods.transfer import Transfer
-from srbf.report import write_report
 
 PICTURE = "beside_cycles.png"
 FIT = Transfer(clusters=256, components=12, editable=True)  # 13 bytes per texel
@@ -105,9 +104,7 @@ def run_demo_inside(
     timings: dict[str, float] = {}
     clock = time.perf_counter
     started = clock()
-    if not blend.is_file():
-        reporter.say(f"building {blend}")
-        build_scene(name, blend, scene.options)
+    scene_file(name, blend, reporter, scene.options)
     receivers = objects_of(blend, [scene.collection], reporter.say)
     settings = scene.settings(receivers, quality)
     reporter.say(f"tracing form factors for {settings.width}x{settings.height} texels of {len(receivers)} objects")
@@ -141,12 +138,8 @@ def run_demo_inside(
     capture = Capture.open(capture_folder)
     errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"))
     whole = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), direct=direct)
-    asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     timings["evaluate"] = clock() - started
-    asset.save(asset_folder, force=True)
-    reporter.say("drawing the report")
-    files.make_folder(folder / "report")
-    page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder)
+    page = reported(asset, capture, folder, errors, timings, reporter)
     held_out, on_disk = errors["holdout"], sum(path.stat().st_size for path in asset_folder.iterdir())
     alone = f", their noise of {settings.holdout_samples} samples alone {100 * held_out['noise']:.1f} %" if "noise" in held_out else ""
     reporter.say(

@@ -15,7 +15,7 @@ from srbf.demo import Demo, Progress, Quality, Ready, Shown, run_demo, scene_scr
 from srbf.demo.dome import run_demo_dome
 from srbf.demo.index_page import Card, data_uri, index_page
 from srbf.demo.inside import run_demo_inside
-from srbf.errors import SrbfError
+from srbf.errors import InputError, SrbfError
 from srbf.io import files
 from srbf.viewer.built_page import page_files
 from srbf.viewer.contents import contents_of
@@ -23,6 +23,7 @@ from srbf.viewer.single_file import single_file
 
 INDEX = "index.html"
 KEPT = "card.json"  # of a finished scene
+UNFINISHED = "Not finished: the same command resumes it."
 
 
 @dataclass(frozen=True)
@@ -82,16 +83,18 @@ def run_tour(folder: Path, reporter: Reporter, progress: Progress, quality: Qual
     """Make the scenes of STOPS, each in a folder of its own; those after one that fails, too; returns a line for each failure.
 
     The index is there, and its path is said, as soon as the first scene can be opened. Finished scenes are kept, others resumed.
-    MissingLibraryError where the scenes or the built page are not installed.
+    MissingLibraryError where the scenes or the built page are not installed; InputError where `folder` has scenes of another quality.
     """
     page_files()
     for stop in STOPS:
         scene_script(stop.name)
     files.make_folder(folder)
     tour = _Tour(folder, reporter, progress, quality)
-    failures = [line for number in range(len(STOPS)) if (line := tour.visit(number))]
-    tour.write(grows=False)
-    return failures
+    tour.check_quality()
+    try:
+        return [line for number in range(len(STOPS)) if (line := tour.visit(number))]
+    finally:
+        tour.end()
 
 
 class _Tour:
@@ -101,6 +104,23 @@ class _Tour:
         self._folder, self._reporter, self._progress, self._quality = folder, reporter, progress, quality
         self._cards = [stop.card() for stop in STOPS]
         self._is_said = False
+
+    def check_quality(self) -> None:
+        """InputError where a finished scene has another quality."""
+        for stop in STOPS:
+            quality = (self._found(stop) or {}).get("quality", self._quality)
+            if quality != self._quality:
+                raise InputError(
+                    f"expected quality {quality}, that of the scenes in {self._folder}, found {self._quality}; "
+                    "choose another folder, or delete it"
+                )
+
+    def end(self) -> None:
+        """The index as it stays; scenes that an interrupt left say so."""
+        for card in self._cards:
+            if not card.is_done:
+                card.note = UNFINISHED
+        self.write(grows=False)
 
     def write(self, grows: bool = True) -> None:
         """The index as it is now; says where it is once there is a link on it."""
@@ -128,10 +148,10 @@ class _Tour:
             made = stop.make(stop.name, self._folder / stop.name, reporter, self._progress, self._quality, partial(self._show, stop, card))
         except Exception as error:  # noqa: BLE001  whatever it is, the other scenes can still be made
             line = f"{stop.name} failed: {_in_one_line(error)}"
-            card.note, card.failed = line, True
+            card.note, card.failed, card.is_done = line, True, True
             self._reporter.say(line)
         else:
-            card.note = f"{made.error[0].upper()}{made.error[1:]}."
+            card.note, card.is_done = f"{made.error[0].upper()}{made.error[1:]}.", True
             files.write_json(self._folder / stop.name / KEPT, self._record(card))
         self.write()
         return line
@@ -146,14 +166,19 @@ class _Tour:
 
     def _kept(self, stop: Stop) -> Card | None:
         """The card of a scene that is finished and whose page is there."""
-        path = self._folder / stop.name / KEPT
-        if not path.is_file() or not (self._folder / f"{stop.name}.html").is_file():
+        found = self._found(stop)
+        if found is None or not (self._folder / f"{stop.name}.html").is_file():
             return None
-        with suppress(SrbfError, KeyError, TypeError):
-            found = files.read_json(path)
+        with suppress(KeyError, TypeError):
             card = Card(**found["card"])
             if found == self._record(card):
                 return replace(card, title=stop.title, sentence=stop.sentence, opens=stop.opens)
+        return None
+
+    def _found(self, stop: Stop) -> dict[str, Any] | None:
+        """What a finished scene recorded."""
+        with suppress(SrbfError):
+            return files.read_json(self._folder / stop.name / KEPT)
         return None
 
     def _record(self, card: Card) -> dict[str, Any]:

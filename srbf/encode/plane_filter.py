@@ -1,9 +1,9 @@
-"""A linear filter of values on surfaces, without their noise: planes through neighbors, by those neighbors that agree within the noise.
+"""A linear filter that removes noise on surfaces and preserves edges: planes fitted to the neighbors that agree within the noise.
 
-Each texel has values that guide the filter, of a known variance of noise. Where the texel's neighbors lie on one plane within that noise,
-its row of the filter is that of a plane, fitted again by those that do; elsewhere, at edges, the row is 1. A texel that its neighbors
-contradict is replaced by theirs. So grain goes and edges stay, as in non-local means of a known variance, and where there is no noise
-next to nothing changes [Buades2005; Takeda2007].
+Guide values of a known noise variance decide the weights. A plane is fitted to the neighbors of a texel, and again to those within the
+noise of it. The texel's row of the filter evaluates that plane at the texel. Where fewer than half of the neighbors agree, as at edges, the
+texel is kept. A texel that is itself far off the plane has no weight in its own fit. Where there is no noise, almost nothing changes, as
+with non-local means of a known variance [Buades2005; Takeda2007].
 """
 
 from __future__ import annotations

@@ -28,7 +28,8 @@ from srbf.sphere import Domain
 MOST_CLUSTERS = 256  # a texel's index is a byte
 SAMPLE_TEXELS = 1 << 14  # at least; and so many a cluster:
 TEXELS_PER_CLUSTER = 96
-MORE_PER_CLUSTER, SAMPLE_BYTES = 192, 1 << 28  # where a sample of them is no larger
+MOST_PER_CLUSTER = 192  # as far as SAMPLE_BYTES allow
+SAMPLE_BYTES = 1 << 28
 
 TRIED_CLUSTERS = (16, 64, 256)
 MOST_TRIED = 64  # components of a candidate
@@ -173,7 +174,7 @@ class ClusteredEigenMap(CoefficientMaps):
         """How many texels clusters are made of."""
         least = 0 if capture.is_cubemap else SAMPLE_TEXELS  # whose rows are of thousands of lights
         affordable = SAMPLE_BYTES // (12 * lights * self.clusters)
-        return max(least, self.clusters * min(max(TEXELS_PER_CLUSTER, affordable), MORE_PER_CLUSTER))
+        return max(least, self.clusters * min(max(TEXELS_PER_CLUSTER, affordable), MOST_PER_CLUSTER))
 
     def __str__(self) -> str:
         return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"

@@ -101,8 +101,24 @@ def test_what_fails_leaves_the_other_scenes(scenes: Callable[..., Made], tmp_pat
     (tmp_path / "coin" / tour.KEPT).write_text("{}")
     assert tour.run_tour(tmp_path, Reporter(), lambda *_: None, "draft") == []
     assert again.made[2:] == ["loft", "coin"], "its page is gone, or its record is damaged"
-    assert tour.run_tour(tmp_path, Reporter(), lambda *_: None, "publish") == []
-    assert again.made[4:] == ["loft", "caustics", "coin"], "of another quality"
+    before = (tmp_path / "index.html").read_text()
+    done = CliRunner().invoke(app, ["demo", "-o", str(tmp_path), "--quality", "publish"])
+    assert done.exit_code == 1 and "expected quality draft, that of the scenes in" in " ".join(done.output.split())
+    assert again.made[4:] == [] and (tmp_path / "index.html").read_text() == before
+
+
+def test_an_interrupted_tour_says_so(scenes: Callable[..., Made], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object) -> Demo:
+        raise KeyboardInterrupt
+
+    scenes()
+    stops = (tour.STOPS[0], replace(tour.STOPS[1], make=interrupt), tour.STOPS[2])
+    monkeypatch.setattr(tour, "STOPS", stops)
+    with pytest.raises(KeyboardInterrupt):
+        tour.run_tour(tmp_path, Reporter(), lambda *_: None)
+    index = (tmp_path / "index.html").read_text()
+    assert 'http-equiv="refresh"' not in index and links(index) == ["loft.html"]
+    assert index.count("Not finished: the same command resumes it.") == 2 and "Being made now." not in index
 
 
 def test_a_card_names_what_its_page_opens_with() -> None:
@@ -142,7 +158,7 @@ def test_a_split_bake_has_no_lights_to_choose_by() -> None:
 @pytest.mark.blender
 def test_a_coin_from_photographs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(DOMES, "coin", {"draft": Photographs(Dome(9, 2, 12), 24, 1)})
-    monkeypatch.setattr(dome, "FIT", replace(dome.FIT, clusters=2, components=4))
+    monkeypatch.setattr(dome, "PAGE_FIT", replace(demo.PAGE_FIT, clusters=2, components=4))
     for module in (canvas, abrdf_mosaic):
         monkeypatch.setattr(module, "DPI", 40)
     shown: list[np.ndarray] = []
@@ -158,7 +174,7 @@ def test_a_coin_from_photographs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_caustics_with_direct_light_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "SCENES", {"caustics": replace(demo.SCENES["caustics"], size=(24, 24))})
     monkeypatch.setattr(demo, "HOLDOUT_SAMPLES", 1)
-    monkeypatch.setattr(demo, "SPLIT_FIT", replace(demo.SPLIT_FIT, clusters=2, components=4))
+    monkeypatch.setattr(demo, "PAGE_FIT", replace(demo.PAGE_FIT, clusters=2, components=4))
     monkeypatch.setattr(demo, "write_report", lambda *_args, **_named: tmp_path / "index.html")
     words = ["demo", "--scene", "caustics", "--transport", "indirect", "--lights", "26", "-o", str(tmp_path)]
     done = CliRunner().invoke(app, words)

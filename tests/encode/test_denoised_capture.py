@@ -52,6 +52,17 @@ def test_images_without_noise_stay(truth: Capture) -> None:
     assert rms(train_images(clean_of(truth)) - train_images(truth)) < 0.01
 
 
+def test_detail_stays_where_there_is_less_noise_than_elsewhere(make_capture: Make) -> None:
+    grain, quiet = 0.1, 0.01
+    noisy = floor_capture(make_capture, quiet, grain, noisier=20.0)
+    lost = train_images(clean_of(noisy)) - train_images(floor_capture(make_capture, 0.0, grain, name="truth"))
+    position = noisy.geometry("position")
+    assert position is not None
+    far = position[..., 1] > STEP * SIDE / 4
+    assert rms(lost[:, ~far]) < 3 * quiet
+    assert rms(lost[:, far]) < 0.6 * 20 * quiet
+
+
 def test_only_train_images_change(noisy: Capture) -> None:
     clean = clean_of(noisy)
     for i in [*noisy.indices("validation"), *noisy.indices("holdout")]:

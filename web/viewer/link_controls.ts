@@ -2,6 +2,7 @@
 import type { Links, Objects } from "../src";
 import { isChosen, isLinked, linksOf } from "../src/light_linking";
 import type { LightState } from "./light_state";
+import { chip } from "./messages";
 
 const LISTS = { receivers: "Shines on", blockers: "Shadowed by" } as const;
 const MANY = 12; // objects, from which on one can search
@@ -60,7 +61,7 @@ function list(light: LightState, link: keyof Links, names: readonly string[], ch
   }
   const all = document.createElement("div");
   all.className = "all";
-  all.append(button("All", () => choose(new Set(names))), button("None", () => choose(new Set())));
+  all.append(chip("All", () => choose(new Set(names))), chip("None", () => choose(new Set())));
   rows.className = "rows";
   details.append(summary, all, ...(names.length > MANY ? [search(rows)] : []), rows);
   show();
@@ -76,12 +77,4 @@ function search(rows: HTMLElement): HTMLInputElement {
     for (const row of rows.children as unknown as Iterable<HTMLElement>) row.hidden = !row.textContent?.toLowerCase().includes(input.value.toLowerCase());
   };
   return input;
-}
-
-function button(text: string, act: () => void): HTMLButtonElement {
-  const made = document.createElement("button");
-  made.className = "chip";
-  made.textContent = text;
-  made.onclick = act;
-  return made;
 }

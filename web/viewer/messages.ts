@@ -1,7 +1,16 @@
-/** The page's elements, and its one-line messages. */
+/** The page's elements and small buttons, and its one-line messages. */
 const TOAST = 8000; // milliseconds
 
 export const element = <E extends HTMLElement>(id: string) => document.getElementById(id) as E;
+
+/** A button of a row of them. */
+export function chip(text: string, act: () => void): HTMLButtonElement {
+  const made = document.createElement("button");
+  made.className = "chip";
+  made.textContent = text;
+  made.onclick = act;
+  return made;
+}
 
 export function say(message: string, kind: "toast" | "hint" = "toast"): void {
   const place = element(kind);

@@ -1,5 +1,6 @@
 /** A mixing desk of the scene's own lights: on or off, color and intensity of each, by name. Every control is a form element, for keyboards. */
 import { isDesigned, type NamedState, namedState, round } from "./light_state";
+import { chip } from "./messages";
 import type { Changed, State } from "./state";
 
 const MIDDLE = 100; // of the dial: intensity 1, as designed; the ends are 0 and 4
@@ -46,9 +47,9 @@ export class Mixer {
     const buttons = document.createElement("div");
     buttons.className = "all";
     buttons.append(
-      button("All on", () => this.all(() => ({ on: true }))),
-      button("All off", () => this.all(() => ({ on: false }))),
-      button("As designed", () => this.all(({ name }) => namedState(name))),
+      chip("All on", () => this.all(() => ({ on: true }))),
+      chip("All off", () => this.all(() => ({ on: false }))),
+      chip("As designed", () => this.all(({ name }) => namedState(name))),
     );
     this.place.replaceChildren(buttons, ...(lights.length > MANY ? [this.search(list)] : []), list);
     this.fill(list);
@@ -128,12 +129,4 @@ export class Mixer {
     show();
     return { element, row: { light, show } };
   }
-}
-
-function button(text: string, act: () => void): HTMLButtonElement {
-  const made = document.createElement("button");
-  made.className = "chip";
-  made.textContent = text;
-  made.onclick = act;
-  return made;
 }
