@@ -14,6 +14,8 @@ from mathutils import Matrix, Vector
 TYPES = {"directional": "SUN", "point": "POINT", "sphere": "POINT", "spot": "SPOT", "area": "AREA"}
 ROUND = math.sqrt(math.pi) / 2  # side of a square of the area of a disk of diameter 1
 SAME = 1e-5  # m: sides of an area that are equal
+LINKS = {"receivers": "receiver_collection", "blockers": "blocker_collection"}
+NOTHING = "srbf nothing"  # an object that nothing renders
 
 
 class RigError(Exception):
@@ -37,7 +39,8 @@ def take(scene: bpy.types.Scene, frame: dict[str, Any]) -> tuple[int, list[str]]
     """Set the scene's lights; (how many were set, a line for each that was not).
 
     Place, orientation, color, power, size, cone and visibility are set. Suns keep their place, disks their shape; suns without an `angle`
-    keep theirs, spots without a `size` their radius. What a light is linked to stays.
+    keep theirs, spots without a `size` their radius. Lights are linked to the objects that the file names, by collections of their own;
+    where it names none, those of a former file go, and the scene's own stay.
 
     Power then includes exposure, temperature and nodes, which are off. RigError for lights without the values of their kind.
     """
@@ -56,6 +59,7 @@ def take(scene: bpy.types.Scene, frame: dict[str, Any]) -> tuple[int, list[str]]
             _set(found, light)
         except (KeyError, TypeError, ValueError) as error:
             raise RigError(f"expected the values of a {light['kind']} light for {light['name']!r}, found others ({error})") from error
+        notes += _link(scene, found, light)
         found.hide_render = found.hide_viewport = False
         count += 1
     for name in frame.get("off", ()):
@@ -106,6 +110,38 @@ def _set(obj: bpy.types.Object, light: dict[str, Any]) -> None:
     elif data.type == "AREA":
         _size(data, Vector(light["u"]).length, Vector(light["v"]).length)
     obj.matrix_world = Matrix.Translation(place) @ turn.to_4x4()
+
+
+def _link(scene: bpy.types.Scene, obj: bpy.types.Object, light: dict[str, Any]) -> list[str]:
+    """Choose what the light shines on, and what shadows it; a line for each object that the scene lacks."""
+    linking = getattr(obj, "light_linking", None)
+    if linking is None:
+        return []
+    notes = []
+    for link, place in LINKS.items():
+        present, name = getattr(linking, place), f"srbf {obj.name} {link}"
+        own = present if present is not None and present.name == name else None
+        if own is not None:
+            bpy.data.collections.remove(own)
+        if link in light:
+            collection, missing = _collection(scene, name, light[link])
+            setattr(linking, place, collection)
+            notes += [f"{obj.name!r} is linked to {one!r}, which this scene lacks" for one in missing]
+    return notes
+
+
+def _collection(scene: bpy.types.Scene, name: str, choice: dict[str, list[str]]) -> tuple[bpy.types.Collection, list[str]]:
+    """Of `only` some objects, `without` others; and the names that the scene lacks."""
+    made = bpy.data.collections.new(name)
+    states = dict.fromkeys(choice.get("only", ()), "INCLUDE") | dict.fromkeys(choice.get("without", ()), "EXCLUDE")
+    for one in states:
+        if one in scene.objects:
+            made.objects.link(scene.objects[one])
+    for member, one in zip(made.collection_objects, made.objects, strict=True):
+        member.light_linking.link_state = states[one.name]
+    if "only" in choice and not any(states[one.name] == "INCLUDE" for one in made.objects):
+        made.objects.link(bpy.data.objects.get(NOTHING) or bpy.data.objects.new(NOTHING, None))  # a collection without any chooses all
+    return made, [one for one in states if one not in scene.objects]
 
 
 def _placed(obj: bpy.types.Object, light: dict[str, Any]) -> tuple[Vector, Matrix]:

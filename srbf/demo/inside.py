@@ -84,7 +84,7 @@ INSIDE = {
         "atlas",
         ("--unlit", "--diffuse"),
         ((2.9, 2.3, 1.6), (5.0, 2.55, 1.3), (6.6, 2.4, 1.4)),
-        Amount(256, SURFELS, 0.3, replace(FIT, clusters=128, rank=256, surfels=1500), 2, 32, (320, 240)),
+        Amount(256, SURFELS, 0.3, replace(FIT, clusters=128, surfels=1500), 2, 32, (320, 240)),
         Amount(512, MOST_SURFELS, None, FIT, 12, 256, (800, 600)),
     )
 }

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from srbf import demo
 from srbf.asset import Asset
 from srbf.cli import app
 from srbf.demo import SCENES, inside
@@ -69,7 +70,7 @@ def test_a_loft_from_script_to_picture(tmp_path: Path, monkeypatch: pytest.Monke
     few = replace(Transfer(), clusters=4, surfels=800, rank=48, editable=True)
     small = replace(loft, places=loft.places[:1], draft=Amount(48, 600, 0.8, few, 1, 4, (40, 30)))
     monkeypatch.setattr(inside, "INSIDE", {"loft": small})
-    monkeypatch.setattr(inside, "write_report", lambda *_args, **_named: tmp_path / "index.html")  # has tests of its own
+    monkeypatch.setattr(demo, "write_report", lambda *_args, **_named: tmp_path / "index.html")  # has tests of its own
     for name in ("PLACED", "MOST_PLACED", "NEAR", "SPOTS"):
         monkeypatch.setattr(transfer_basis, name, 40)
     seen: list[list[Path]] = []

@@ -243,6 +243,11 @@ def take_lights(case: dict) -> dict:
     bpy.data.objects["Disk"].data.shape = "DISK"
     bpy.data.objects["Spot"].data.exposure = 2
     bpy.data.objects["Panel"].scale = (2, 3, 1)
+    for name in ("Box", "Wall"):
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, bpy.data.meshes.new(name)))
+    own = bpy.data.collections.new("by the artist")
+    own.objects.link(bpy.data.objects["Wall"])
+    bpy.data.objects["Sun"].light_linking.receiver_collection = bpy.data.objects["Key"].light_linking.blocker_collection = own
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="before")
 
@@ -256,11 +261,25 @@ def take_lights(case: dict) -> dict:
             values[obj.name] = {**own, "matrix": [list(row) for row in obj.matrix_world], "hidden": obj.hide_render}
         return values
 
+    def links(name: str) -> dict:
+        linking, found = bpy.data.objects[name].light_linking, {}
+        for link, place in (("receivers", linking.receiver_collection), ("blockers", linking.blocker_collection)):
+            if place is not None:
+                members = zip(place.collection_objects, place.objects, strict=True)
+                found[link] = {one.name: member.light_linking.link_state for member, one in members}
+        return found
+
     before = told()
     result = bpy.ops.srbf.take_lights("EXEC_DEFAULT", True, filepath=case["rig"])
-    after = told()
+    after, linked = told(), {name: links(name) for name in ("Key", "Globe", "Sun")}
     bpy.ops.ed.undo()
-    return {"before": before, "after": after, "undone": told(), "result": sorted(result)}
+    undone, linked_before = told(), {name: links(name) for name in ("Key", "Globe", "Sun")}
+    again = [bpy.ops.srbf.take_lights("EXEC_DEFAULT", True, filepath=case[name]) for name in ("rig", "plain")]
+    left = {name: links(name) for name in ("Key", "Globe", "Sun")}
+    return {
+        **{"before": before, "after": after, "undone": undone, "result": sorted(result), "again": [sorted(one) for one in again]},
+        **{"linked": linked, "linked_before": linked_before, "left": left},
+    }
 
 
 def command(case: dict) -> dict:

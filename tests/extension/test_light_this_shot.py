@@ -84,10 +84,16 @@ def test_a_true_shot_is_served(in_blender, tmp_path, tmp_path_factory) -> None:
     assert [one["name"] for one in told["scene_lights"]]
 
 
+LINKS = ("receivers", "blockers")
+
+
 def test_lights_are_taken_back_by_name(in_blender, tmp_path) -> None:
-    entries = [
-        {"name": "Key", "kind": "point", "position": [1, 2, 0.5], "color": [1, 0.5, 0.25], "a0": 2},
-        {"name": "Globe", "kind": "sphere", "position": [0, 1, 1], "size": 0.2, "color": [0.5, 0.5, 0.5]},
+    entries: list[dict[str, Any]] = [
+        {
+            **{"name": "Key", "kind": "point", "position": [1, 2, 0.5], "color": [1, 0.5, 0.25], "a0": 2},
+            **{"receivers": {"without": ["Box"]}, "blockers": {"only": ["Box", "Gone"]}},
+        },
+        {"name": "Globe", "kind": "sphere", "position": [0, 1, 1], "size": 0.2, "color": [0.5, 0.5, 0.5], "blockers": {"only": []}},
         {
             "name": "Spot",
             "kind": "spot",
@@ -105,7 +111,11 @@ def test_lights_are_taken_back_by_name(in_blender, tmp_path) -> None:
     ]
     rig = tmp_path / "FRAMES.json"
     rig.write_text(json.dumps({"frames": [{"lights": entries, "off": ["Fill"]}]}))
-    found = in_blender("take_lights", rig=str(rig))
+    plain = tmp_path / "PLAIN.json"
+    plain.write_text(
+        json.dumps({"frames": [{"lights": [{key: value for key, value in entry.items() if key not in LINKS} for entry in entries]}]})
+    )
+    found = in_blender("take_lights", rig=str(rig), plain=str(plain))
     key, globe, spot, panel, disk, sun, fill = (found["after"][name] for name in ("Key", "Globe", "Spot", "Panel", "Disk", "Sun", "Fill"))
     assert found["result"] == ["FINISHED"]
     energies = [key["energy"], globe["energy"], spot["energy"], panel["energy"], sun["energy"]]
@@ -124,3 +134,13 @@ def test_lights_are_taken_back_by_name(in_blender, tmp_path) -> None:
     assert np.array(sun["matrix"])[2, 3] == 3 and [key["hidden"], fill["hidden"]] == [False, True]
     assert "'Nobody' is no light of this scene" in found["stdout"] + found["stderr"]
     assert found["undone"] == found["before"]
+    artist = {"Wall": "INCLUDE"}
+    assert found["linked_before"] == {"Key": {"blockers": artist}, "Globe": {}, "Sun": {"receivers": artist}}
+    assert found["linked"] == {
+        "Key": {"receivers": {"Box": "EXCLUDE"}, "blockers": {"Box": "INCLUDE"}},
+        "Globe": {"blockers": {"srbf nothing": "INCLUDE"}},
+        "Sun": {"receivers": artist},
+    }
+    assert "'Key' is linked to 'Gone', which this scene lacks" in found["stdout"] + found["stderr"]
+    assert found["again"] == [["FINISHED"]] * 2
+    assert found["left"] == {"Key": {}, "Globe": {}, "Sun": {"receivers": artist}}, "a rig without choices takes those of the former back"

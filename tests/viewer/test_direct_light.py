@@ -129,21 +129,55 @@ def test_a_site_adds_it_too(chromium: Any, split: Asset, serve_static: Callable[
     assert (apart.max(), apart.mean()) <= (MOST_APART, MEAN_APART)
 
 
-def test_shadows_on_a_mesh_are_finer_than_the_lightmap(chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
-    """Texels are 8 cm wide. The edge of a shadow is narrower than 0.4 of that; at the lightmap's resolution it is as wide as a texel."""
+HIGH, ABOVE = 2.2, np.array([-0.4, 0.1, 2.5])  # of the eye and of the light, m
+
+
+def from_above(folder: Path, split: Asset, serve: Callable[..., str], terms: str) -> str:
+    """The address of a page that shows the ground on its mesh, under a point light over the ball."""
     source = {**split.manifest.get("source", {}), "receiver": {"kind": "lightmap", "object": "Ground"}}
-    replace(split, manifest={**split.manifest, "source": source}).save(tmp_path / "asset")
-    light = {"kind": "point", "on": True, "color": "#ffffff", "intensity": 1.0, "position": [-0.4, 0.1, 2.5], "a0": 2.5}
+    replace(split, manifest={**split.manifest, "source": source}).save(folder, force=True)
+    light = {"kind": "point", "on": True, "color": "#ffffff", "intensity": 1.0, "position": ABOVE.tolist(), "a0": 2.5}
     state = {
-        **{"terms": "direct", "exposure": 0, "selected": -1, "view": "mesh", "eye": [[0.0, -0.01, 2.2], [0.0, 0.0, 0.0]]},
+        **{"terms": terms, "exposure": 0, "selected": -1, "view": "mesh", "eye": [[0.0, -1e-4, HIGH], [0.0, 0.0, 0.0]]},
         "lights": [{**light, "falloff": "inverse-square", "radius": 0.001}],
     }
-    chromium("open", url=f"{serve(tmp_path / 'asset')}#{quote(json.dumps(state))}", width=WIDTH, height=HEIGHT)
-    (tmp_path / "saved.png").write_bytes(chromium.file("Picture (PNG)"))
-    shown = read_image(tmp_path / "saved.png", 3)[..., 1]
-    row = shown[np.argmax((shown < 0.02).sum(axis=1))]  # through the shadow of the ball
-    last = int(np.flatnonzero(row < 0.02).max())
-    texel = 2 / SIDE * len(shown) / (2 * 2.2 * np.tan(np.radians(38 / 2)))  # pixels
-    edge = row[last - 2 : last + int(2 * texel)]
-    assert edge[-1] > 0.1, "light, beside the shadow"
-    assert ((edge > 0.1 * edge[-1]) & (edge < 0.9 * edge[-1])).sum() < 0.4 * texel
+    return f"{serve(folder)}#{quote(json.dumps(state))}"
+
+
+def picture_of(chromium: Any, url: str, path: Path) -> np.ndarray:
+    """Linear (H, W, 3)."""
+    chromium("open", url=url, width=WIDTH, height=HEIGHT)
+    path.write_bytes(chromium.file("Picture (PNG)"))
+    stored = read_image(path, 3)
+    return np.where(stored > 0.04045, ((stored + 0.055) / 1.055) ** 2.4, stored / 12.92)
+
+
+def test_shadows_on_a_mesh_are_as_sharp_as_the_screen(chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
+    """Texels are 8 cm wide, pixels 3 mm. Every pixel has the light of its own place by the closed form, and that of its texels."""
+    bright = replace(split, stored=np.abs(split.stored))
+    shown, indirect, both = (
+        picture_of(chromium, from_above(tmp_path / terms, bright, serve, terms), tmp_path / f"{terms}.png")
+        for terms in ("direct", "indirect", "both")
+    )
+    height, width = shown.shape[:2]
+    pixel = 2 * HIGH * np.tan(np.radians(38 / 2)) / height
+    x, y = np.meshgrid((np.arange(width) + 0.5 - width / 2) * pixel, (height / 2 - np.arange(height) - 0.5) * pixel)
+    place = np.stack([x, y, np.zeros_like(x)], axis=2)
+    away = ABOVE - place
+    far = np.linalg.norm(away, axis=2)
+    along = ((np.array([-0.4, 0.1, 0.6]) - place) * away).sum(axis=2) / far
+    beside = np.sqrt(((np.array([-0.4, 0.1, 0.6]) - place) ** 2).sum(axis=2) - along**2)  # of the ray, from the ball's center
+    clear = (np.abs(x) < 0.95) & (np.abs(y) < 0.95) & (x < 0.1) & (np.abs(beside - 0.35) > 0.01)  # not through the pane
+    expected = np.where(beside < 0.35, 0, away[..., 2] / far * (2.5 / far) ** 2)[..., None] * np.ones(3)
+    if split.manifest["quantity"] == "radiance":
+        expected = expected * np.array([0.8, 0.5, 0.3]) / np.pi
+    dark = clear & (beside < 0.35)
+    assert dark.sum() > 1000
+    assert shown[dark].max() < 0.02
+    lit = clear & (beside > 0.35)
+    np.testing.assert_allclose(shown[lit], np.minimum(expected[lit], 1), atol=0.02)
+    total = shown + indirect
+    inside = total < 0.9
+    assert indirect.max() > 0.02
+    assert inside.mean() > 0.2
+    np.testing.assert_allclose(both[inside], total[inside], atol=0.02)

@@ -23,6 +23,9 @@ export interface Numbered {
   readonly objects: Int32Array;
 }
 
+/** Whether lights of a kind may choose: environments and a scene's own lights by name may not. */
+export const isLinkable = (kind: unknown): boolean => kind !== "environment" && kind !== "named";
+
 export const isLinked = ({ receivers, blockers }: Links): boolean => Boolean(receivers ?? blockers);
 
 /** The choices alone of what may have more. */

@@ -4,6 +4,7 @@ import { squaredDistance } from "./nearest_triangle";
 const LEAF = 4; // triangles
 const DEEPEST = 64;
 const BINS = 16;
+const TOUCHING = 1e-6; // of the coordinates: a triangle as near as that is the nearest
 
 export class Occluders {
   /** Boxes, six numbers each: least x, y, z, most x, y, z. */
@@ -17,6 +18,8 @@ export class Occluders {
   private readonly order: Uint32Array;
   private readonly stack = new Int32Array(DEEPEST);
   private used = 0;
+  /** Which triangle, in the order of the leaves, was last nearest to a place. */
+  private former = 0;
 
   /** `corners`: nine numbers per triangle. */
   constructor(corners: Float32Array) {
@@ -78,7 +81,7 @@ export class Occluders {
     return false;
   }
 
-  /** The number of the triangle that is nearest to a place, of several any; -1 of none. */
+  /** The number of the triangle that is nearest to a place, of several any; -1 of none. Fast where places follow each other along a surface. */
   nearest(x: number, y: number, z: number): number {
     if (this.used === 0) return -1;
     const { boxes, next, counts, stack, order, triangles } = this;
@@ -89,9 +92,12 @@ export class Occluders {
       const dz = Math.max(boxes[b + 2] - z, z - boxes[b + 5], 0);
       return dx * dx + dy * dy + dz * dz;
     };
-    let [found, least, top] = [-1, Infinity, 0];
+    let found = this.former;
+    let least = squaredDistance(triangles, 9 * found, x, y, z);
+    const touching = (TOUCHING * (1 + Math.abs(x) + Math.abs(y) + Math.abs(z))) ** 2;
+    let top = 0;
     stack[top++] = 0;
-    while (top > 0) {
+    while (top > 0 && least > touching) {
       const node = stack[--top];
       if (apart(node) >= least) continue;
       if (counts[node] === 0) {
@@ -105,7 +111,8 @@ export class Occluders {
         if (squared < least) [least, found] = [squared, i];
       }
     }
-    return order[found] ?? -1;
+    this.former = found;
+    return order[found];
   }
 
   /** [Moeller1997], both sides. */

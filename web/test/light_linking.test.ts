@@ -8,6 +8,7 @@ import { Cells } from "../src/received_light";
 import { placed } from "../src/surfels";
 import { designedLights, requireObjects } from "../viewer/asset_lights";
 import { blenderRig } from "../viewer/blender_rig";
+import { stateOf } from "../viewer/keyframes";
 import type { LightState } from "../viewer/light_state";
 import { choiceOf, lineOf } from "../viewer/link_controls";
 
@@ -118,5 +119,12 @@ describe("lights as designed", () => {
     const told = (only: string[]) => JSON.parse(/LIGHTS = json.loads\(r"""(.*?)"""\)/s.exec(blenderRig([{ ...designedLights(asset)[0], links: { receivers: { only } } }] as LightState[], 0, designed))?.[1] ?? "");
     expect(told(["Near", "Far"])[0].changed).toBe(false);
     expect(told(["Near"])[0].changed).toBe(true);
+  });
+
+  it("belong to lights that may choose", () => {
+    const links = { receivers: { only: ["Near"] } };
+    const stored = [{ kind: "environment", file: "room.hdr" }, { kind: "named", name: "Key" }];
+    for (const entry of stored) expect(() => stateOf({ ...entry, ...links }, "frame 0", "linear")).toThrow(/expected suns and lights of a place/);
+    expect(stateOf({ kind: "directional", direction: [0, 0, 1], ...links }, "frame 0", "linear").links).toEqual(links);
   });
 });

@@ -7,6 +7,7 @@ import { FullscreenPass, undisturbed } from "../src/three/fullscreen";
 import { floatTexture } from "../src/three/float_textures";
 import type { BallState } from "./ball_state";
 import { DirectLight } from "./direct_light";
+import { byTexels } from "./pixel_light";
 import { fromThree, toThree } from "./frames";
 import { lineOf, say } from "./messages";
 import { screenMaterial, type ScreenUniforms } from "./screen";
@@ -74,7 +75,7 @@ export class Ball {
     const uv = this.geometry.getAttribute("uv").clone();
     for (let i = 0; i < uv.count; ++i) uv.setY(i, 1 - uv.getY(i));
     this.geometry.setAttribute("lightmapUv", uv);
-    this.mesh = new Mesh(this.geometry, screenMaterial({ ...uniforms, relit: { value: this.target.texture } }, "mesh"));
+    this.mesh = new Mesh(this.geometry, screenMaterial({ ...uniforms, ...byTexels(), relit: { value: this.target.texture } }, "mesh"));
     if (!scene || manifest.transport !== "indirect") return;
     try {
       this.direct = DirectLight.ofPoints(beside, WIDTH, HEIGHT, scene, renderer);

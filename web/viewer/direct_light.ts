@@ -40,7 +40,6 @@ interface Surface {
 const [SIDES, RINGS] = [32, 16]; // of a ball that casts shadows
 
 export class DirectLight {
-  private readonly lit: readonly LitTexels[];
   private readonly ball = new SphereGeometry(1, SIDES, RINGS);
   private readonly sum: WebGLRenderTarget;
   private readonly suns: () => SunShadows;
@@ -54,32 +53,37 @@ export class DirectLight {
     const { normal, coverage, scene } = inputs;
     const position = asset.position as FloatImage;
     const receivers = factor > 1 ? fineReceivers(asset, position, normal, coverage, factor) : directReceivers(asset, position, normal, coverage, direct?.footprint ?? 1);
-    const surface = { width: factor * width, height: factor * height, reflectance: reflectance(asset, inputs.albedo, factor) };
-    const further = factor > 1 ? {} : { gloss: inputs.gloss, through: inputs.through && reflectance(asset, inputs.through, 1) };
-    return new DirectLight(asset, receivers, { ...surface, ...further }, scene, renderer, factor > 1 ? undefined : new LinkedPixels(scene, position, receivers.center));
+    const surface = { width: factor * width, height: factor * height, reflectance: reflectanceOf(asset, inputs.albedo, factor) };
+    const further = factor > 1 ? {} : { gloss: inputs.gloss, through: inputs.through && reflectanceOf(asset, inputs.through, 1) };
+    const lit = litTexels(receivers, { ...surface, ...further });
+    return new DirectLight(asset, receivers, lit, surface, scene, renderer, factor > 1 ? undefined : new LinkedPixels(scene, position, coverage, receivers.center));
+  }
+
+  /** On pixels of which textures hold points and normals, in the frame of `asset`, points less `center`, and reflectance; of any size, see `resize`. */
+  static ofPixels(asset: Asset, { normal, coverage, scene }: DirectInputs, pixels: { points: Texture; normals: Texture; reflectance: Texture }, renderer: WebGLRenderer): DirectLight {
+    const { center, bounds } = directReceivers(asset, asset.position as FloatImage, normal, coverage, 1);
+    const lit = [{ corners: [pixels], reflectance: pixels.reflectance }];
+    return new DirectLight(asset, { center, bounds, corners: [] }, lit, { width: 1, height: 1 }, scene, renderer);
   }
 
   /** Of `width` x `height` white points that move, in the frame of `asset`: put them somewhere first. @throws as `ofAsset`. */
   static ofPoints(asset: Asset, width: number, height: number, scene: Object3D, renderer: WebGLRenderer): DirectLight {
     const [points, normals] = [0, 1].map(() => new Float32Array(4 * width * height));
     const receivers = { center: [0, 0, 0] as [number, number, number], corners: [{ points, normals }], bounds: new Float32Array(3 * width * height) };
-    return new DirectLight(asset, receivers, { width, height, reflectance: new Float32Array(4 * width * height).fill(1) }, scene, renderer);
+    const lit = litTexels(receivers, { width, height, reflectance: new Float32Array(4 * width * height).fill(1) });
+    return new DirectLight(asset, receivers, lit, { width, height }, scene, renderer);
   }
 
   private constructor(
     private readonly asset: Asset,
     private readonly receivers: DirectReceivers,
-    surface: Surface,
+    private readonly lit: readonly LitTexels[],
+    { width, height }: { width: number; height: number },
     scene: Object3D,
     private readonly renderer: WebGLRenderer,
     private readonly linked?: LinkedPixels,
   ) {
     checkBlending(renderer);
-    const { width, height } = surface;
-    const texture = (data: Float32Array): DataTexture => floatTexture(data, width, height);
-    const corners = this.receivers.corners.map(({ points, normals }) => ({ points: texture(points), normals: texture(normals) }));
-    const front = { corners, reflectance: texture(surface.reflectance), lobes: surface.gloss && lobesOf(surface.gloss, this.receivers.center) };
-    this.lit = [front, ...(surface.through ? [behind(front, this.receivers, surface.through, texture)] : [])];
     this.sum = renderTarget(width, height, RGBAFormat, FloatType);
     const { bounds, center } = this.receivers;
     this.ball.setAttribute("corner", this.ball.getAttribute("position").clone());
@@ -88,6 +92,17 @@ export class DirectLight {
     const casters = [...shadowCasters(scene, center), { geometry: this.ball }];
     this.suns = once(() => new SunShadows(renderer, this.lit, casters, bounds, asset.manifest.direct?.sun_angle ?? 0));
     this.points = once(() => new PointShadows(renderer, this.lit, casters, center));
+  }
+
+  /** What points are less, meters, in the asset's frame. */
+  get center(): Triple {
+    return this.receivers.center;
+  }
+
+  /** Of `ofPixels`, whose textures have changed: how many pixels there are now. */
+  resize(width: number, height: number): void {
+    this.sum.setSize(width, height);
+    this.drawn = "";
   }
 
   /** Put the points of `ofPoints` there, in the asset's frame. */
@@ -148,7 +163,7 @@ export function checkBlending({ extensions }: WebGLRenderer): void {
 }
 
 /** 1, or albedo / pi, RGBA, on a grid that is `factor` times finer in both directions. */
-function reflectance(asset: Asset, albedo: FloatImage | undefined, factor: number): Float32Array {
+export function reflectanceOf(asset: Asset, albedo: FloatImage | undefined, factor: number): Float32Array {
   const { width, height, quantity } = asset.manifest;
   const [across, down] = [factor * width, factor * height];
   const out = new Float32Array(4 * across * down).fill(1);
@@ -168,6 +183,13 @@ function lobesOf({ glossy, lobe, table, camera }: NonNullable<DirectInputs["glos
   const eye = type === "PERSP" ? [...rows.slice(0, 3).map((row, i) => row[3] - center[i]), 1] : [...rows.slice(0, 3).map((row) => row[2]), 0];
   const texture = ({ data, width, height }: FloatImage) => floatTexture(data, width, height);
   return { glossy: texture(glossy), lobes: texture(lobe), lobeAlbedo: texture(table), eye };
+}
+
+function litTexels(receivers: DirectReceivers, { width, height, reflectance, gloss, through }: Surface): LitTexels[] {
+  const texture = (data: Float32Array): DataTexture => floatTexture(data, width, height);
+  const corners = receivers.corners.map(({ points, normals }) => ({ points: texture(points), normals: texture(normals) }));
+  const front = { corners, reflectance: texture(reflectance), lobes: gloss && lobesOf(gloss, receivers.center) };
+  return [front, ...(through ? [behind(front, receivers, through, texture)] : [])];
 }
 
 /** The same texels lit from behind, of what they let through. */

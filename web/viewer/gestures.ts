@@ -53,3 +53,13 @@ export function pickFile(accept: string, take: (file: File) => void): void {
   };
   input.click();
 }
+
+/** A double click, or two taps at once, at a place of an element, CSS pixels. */
+export function onDoubleTap(element: HTMLElement, act: (x: number, y: number) => void): void {
+  let tapped = 0;
+  element.addEventListener("pointerup", (event) => {
+    if (event.pointerType !== "mouse" && event.timeStamp - tapped < 300) act(event.offsetX, event.offsetY);
+    tapped = event.timeStamp;
+  });
+  element.addEventListener("dblclick", (event) => act(event.offsetX, event.offsetY));
+}

@@ -2,7 +2,7 @@
 import { DEFAULT_RADIUS, unit } from "../src/lights";
 import { cross, dot } from "../src/matrix";
 import { type Links, SrbfError, type Triple } from "../src";
-import { isLinked, linksOf } from "../src/light_linking";
+import { isLinkable, isLinked, linksOf } from "../src/light_linking";
 import { areLinks, levelSides, type LightState, round, rounded } from "./light_state";
 import { MOST_LIGHTS, type State } from "./state";
 
@@ -115,6 +115,7 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
   const own = typeof entry.name === "string" && entry.kind !== "named" ? { name: entry.name } : {};
   const links = linksOf(entry as Links);
   if (!areLinks(links)) bad("receivers and blockers as {only, without} of names", links);
+  if (isLinked(links) && !isLinkable(entry.kind)) bad("suns and lights of a place with receivers and blockers", entry.kind);
   const common = { on: true, ...own, ...(isLinked(links) ? { links } : {}), ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
   if (entry.kind === "named") return { kind: "named", ...common, name: typeof entry.name === "string" ? entry.name : bad("a name", entry.name) };
   if (entry.kind === "directional") return { kind: "directional", ...common, direction: rounded(triple("direction")), ...(entry.angle === undefined ? {} : { angle: degrees("angle") }) };

@@ -1,5 +1,6 @@
 /** Lights as the page and its URL hold them: numbers are rounded when they are set, so that page, URL and FRAMES.json agree. */
 import { areaLight, directionalLight, type EnvironmentLight, environmentLight, type Light, type Links, namedLight, pointLight, type Profile, sphereLight, spotLight, SrbfError, type Triple } from "../src";
+import { isLinkable } from "../src/light_linking";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
 import type { Environment } from "./environment_file";
@@ -257,7 +258,7 @@ export function checkLight(value: unknown): LightState {
   if (!Number.isFinite(light.intensity)) bad("a number of intensity");
   if (light.solo !== undefined && typeof light.solo !== "boolean") bad("true or false of solo");
   if (light.name !== undefined && (typeof light.name !== "string" || light.name === "")) bad("a text of name");
-  if (light.links !== undefined && !areLinks(light.links)) bad("receivers and blockers, {only, without} of names, of links");
+  if (light.links !== undefined && !(areLinks(light.links) && isLinkable(light.kind))) bad("receivers and blockers, {only, without} of names, of links");
   if (light.kelvin !== undefined && !((light.kelvin as number) > 0)) bad("a number above 0 of kelvin");
   if (light.kind === "directional") {
     triple("direction");

@@ -18,10 +18,11 @@ export class LinkedPixels {
   /** Names of objects, and the number of that which each pixel shows; found when a light first asks. */
   private found?: { names: string[]; objects: Int32Array };
 
-  /** `position`: of the pixels, in the asset's frame as `scene` is after its turn; `center`: a place among them. */
+  /** `position`, `coverage`: of the pixels, in the asset's frame as `scene` is after its turn; `center`: a place among them. */
   constructor(
     private readonly scene: Object3D,
     private readonly position: FloatImage,
+    private readonly coverage: FloatImage | undefined,
     private readonly center: Triple,
   ) {}
 
@@ -49,7 +50,7 @@ export class LinkedPixels {
 
   /** The object of the triangle that is nearest to each pixel's place. */
   private shown(): { names: string[]; objects: Int32Array } {
-    const { position, center } = this;
+    const { position, coverage, center } = this;
     const numbers = new Map<string, number>();
     const [corners, owners]: number[][] = [[], []];
     this.scene.updateMatrixWorld(true);
@@ -67,10 +68,13 @@ export class LinkedPixels {
       }
     });
     const triangles = new Occluders(new Float32Array(corners));
-    const objects = Int32Array.from({ length: position.width * position.height }, (_, i) => {
-      const [x, y, z] = center.map((middle, k) => position.data[position.channels * i + k] - middle);
-      return owners[triangles.nearest(x, y, z)] ?? -1;
-    });
+    const objects = new Int32Array(position.width * position.height).fill(-1);
+    for (let i = 0; i < objects.length; ++i) {
+      if (coverage && coverage.data[coverage.channels * i] <= 0) continue;
+      const at = position.channels * i;
+      const number = triangles.nearest(position.data[at] - center[0], position.data[at + 1] - center[1], position.data[at + 2] - center[2]);
+      if (number >= 0) objects[i] = owners[number];
+    }
     return { names: [...numbers.keys()], objects };
   }
 }

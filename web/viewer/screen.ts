@@ -1,6 +1,7 @@
 /** What the screen shows per texel: the relit picture, a coefficient map, or the difference to the reference; exposure, tone, false color. */
 import { Color, GLSL3, type IUniform, RawShaderMaterial, ShaderChunk, type Texture, Vector2, Vector4 } from "three";
 import type { SrbfTextures } from "../src/three";
+import { PIXEL_LIGHT, pixelUniforms } from "./pixel_light";
 import type { State } from "./state";
 
 export const VALUES = { picture: 0, reference: 1, difference: 2, map: 3, negative: 4 } as const;
@@ -45,6 +46,14 @@ in vec4 vStored;
 #define AT(texels, vertex) textureLod(texels, place(textureSize(texels, 0)), 0.0).rgb
 #endif
 
+#ifdef ON_MESH
+uniform float texelShare;
+${PIXEL_LIGHT}
+vec3 relitAt() { return texelShare * AT(relit, vRelit) + directAt(); }
+#else
+vec3 relitAt() { return AT(relit, vRelit); }
+#endif
+
 float coverageAt() {
 #if defined(DEVELOPED) || defined(AT_VERTICES)
     return 1.0;
@@ -53,7 +62,6 @@ float coverageAt() {
 #endif
 }
 
-vec3 relitAt() { return AT(relit, vRelit); }
 vec3 referenceAt() { return AT(reference, vReference) * referenceColor + AT(ambient, vAmbient); }
 
 vec3 valueAt() {
@@ -129,8 +137,9 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 in vec3 position;
 in vec2 lightmapUv;
-uniform mat4 modelViewMatrix, projectionMatrix;
+uniform mat4 modelMatrix, viewMatrix, projectionMatrix, litFromScene;
 out vec2 vUv;
+out vec3 vPlace;
 #ifdef AT_VERTICES
 uniform sampler2D relit, ambient, negative, reference;
 uniform sampler2DArray layers;
@@ -147,7 +156,9 @@ void main() {
     vReference = textureLod(reference, lightmapUv, 0.0).rgb;
     vStored = textureLod(layers, vec3(lightmapUv, float(layer)), 0.0);
 #endif
-    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+    vec4 world = modelMatrix * vec4(position, 1.0);
+    vPlace = (litFromScene * world).xyz;
+    gl_Position = projectionMatrix * viewMatrix * world;
 }`;
 
 const PICTURE = `precision highp float;
@@ -167,7 +178,7 @@ void main() {
     gl_Position = vec4(position.xy, 1.0, 1.0);
 }`;
 
-export type ScreenUniforms = Record<string, IUniform> & { negative: IUniform<Texture | null>; reference: IUniform<Texture | null> };
+export type ScreenUniforms = Record<string, IUniform> & ReturnType<typeof pixelUniforms> & { negative: IUniform<Texture | null>; reference: IUniform<Texture | null> };
 
 /** `coverage`: alpha of a view; 1 everywhere for other assets. */
 export function screenUniforms(relit: Texture, textures: SrbfTextures, coverage: Texture): ScreenUniforms {
@@ -192,11 +203,12 @@ export function screenUniforms(relit: Texture, textures: SrbfTextures, coverage:
     toneMappingExposure: { value: 1 },
     pictureScale: { value: new Vector2(1, 1) },
     pictureOffset: { value: new Vector2(0, 0) },
+    ...pixelUniforms(),
   };
 }
 
 const SHADERS = { mesh: MESH, vertices: MESH, picture: PICTURE, screen: WHOLE };
-const DEFINES = { mesh: {}, vertices: { AT_VERTICES: "" }, picture: {}, screen: { DEVELOPED: "" } };
+const DEFINES = { mesh: { ON_MESH: "" }, vertices: { ON_MESH: "", AT_VERTICES: "" }, picture: {}, screen: { DEVELOPED: "" } };
 
 /** Onto a `mesh`, one that has light at its `vertices` alone, a `picture` of texels, or the whole `screen`, where `relit` is of pixels, row 0 at the bottom. */
 export function screenMaterial(uniforms: ScreenUniforms, onto: keyof typeof SHADERS): RawShaderMaterial {

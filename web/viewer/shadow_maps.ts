@@ -23,6 +23,7 @@ import {
   RedFormat,
   RGBAFormat,
   Scene,
+  type Texture,
   type TextureDataType,
   type TextureFilter,
   UnsignedByteType,
@@ -42,8 +43,8 @@ EVERYWHERE.needsUpdate = true;
 
 /** Where light is looked up: points and normals of every texel, several of each, and what a texel makes of irradiance. */
 export interface LitTexels {
-  readonly corners: readonly { points: DataTexture; normals: DataTexture }[];
-  readonly reflectance: DataTexture;
+  readonly corners: readonly { points: Texture; normals: Texture }[];
+  readonly reflectance: Texture;
   /** What texels reflect toward the eye beside that: uniforms of the pack's stages with SRBF_LOBES. */
   readonly lobes?: { readonly glossy: DataTexture; readonly lobes: DataTexture; readonly lobeAlbedo: DataTexture; readonly eye: readonly number[] };
 }

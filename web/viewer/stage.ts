@@ -24,6 +24,7 @@ import { type FittedCamera, fromThree, toThree, viewCamera } from "./frames";
 import { PointLightGizmos } from "./point_light_gizmos";
 import { rounded } from "./light_state";
 import { panAndZoom } from "./pan_zoom";
+import { byTexels, type Pace, type PixelLight } from "./pixel_light";
 import type { Receivers } from "./receivers";
 import { BACKGROUND, COLORS, screenMaterial, type ScreenUniforms, VALUES } from "./screen";
 import type { Changed, State } from "./state";
@@ -45,7 +46,10 @@ export class Stage {
   private readonly developed = new Scene();
   private readonly developedFrom: { value: Texture | null } = { value: null };
   private surroundings?: Surroundings;
-  private readonly lit: Mesh[] = [];
+  /** The receivers' meshes, in three's world. */
+  readonly lit: Mesh[] = [];
+  /** Light of the mesh's pixels, beside that of its texels. */
+  pixelLight?: PixelLight;
   private ball?: { ball: Ball; meshes: Mesh[] };
 
   constructor(
@@ -58,6 +62,7 @@ export class Stage {
     private readonly model: Object3D | undefined,
     quantity: "irradiance" | "radiance",
     changed: Changed,
+    private readonly pace: Pace,
   ) {
     this.quad = new Mesh(new PlaneGeometry(2, 2), screenMaterial(uniforms, "picture"));
     this.quad.frustumCulled = false;
@@ -76,7 +81,7 @@ export class Stage {
     this.placeCamera();
     this.orbit.addEventListener("change", () => {
       this.state.eye = [rounded(fromThree(this.orbitCamera.position)), rounded(fromThree(this.orbit.target))];
-      changed();
+      pace.moved();
     });
     this.gizmos = new PointLightGizmos(this.orbitCamera, canvas, state, receivers.bounds, changed, (dragging) => {
       this.orbit.enabled = !dragging && this.hasMesh;
@@ -106,7 +111,7 @@ export class Stage {
     this.scene.add(ball.mesh);
     if (this.surroundings) {
       const own = new Mesh(ball.geometry);
-      this.surroundings.add(own, { ...this.uniforms, relit: { value: ball.texture } }, quantity);
+      this.surroundings.add(own, { ...this.uniforms, ...byTexels(), relit: { value: ball.texture } }, quantity);
       meshes.push(own);
     }
     this.ball = { ball, meshes };
@@ -239,6 +244,9 @@ export class Stage {
     for (const mesh of this.lit) (mesh.material as Material).side = this.state.cut ? FrontSide : DoubleSide;
     this.surroundings?.cut(this.state.cut);
     this.placeBall();
+    this.uniforms.atPixels.value = this.pixelLight !== undefined;
+    const sides = this.state.cut ? "front" : this.inScene ? "as in the file" : "both";
+    if (this.pixelLight?.draw(this.uniforms, lights, this.orbitCamera, { width, height, sides })) this.pace.drew();
     const whole = this.inScene ? (this.surroundings as Surroundings).draw(this.orbitCamera, lights, behind, width, height) : undefined;
     this.developedFrom.value = whole ?? null;
     renderer.autoClear = true;
@@ -359,6 +367,7 @@ export class Stage {
       if (!uv) return;
       geometry.setAttribute("lightmapUv", uv);
       const shown = new Mesh(geometry, material);
+      shown.userData.surface = mesh.userData.surface;
       shown.applyMatrix4(mesh.matrixWorld);
       this.scene.add(shown);
       this.lit.push(shown);

@@ -1,6 +1,6 @@
 /** The assets that the page can switch between, each loaded when it is first chosen; and the direct light of indirect ones. */
-import type { Texture, WebGLRenderer } from "three";
-import type { Asset, FloatImage, Light, Profile, Triple } from "../src";
+import type { Mesh, Texture, WebGLRenderer } from "three";
+import { type Asset, type FloatImage, type Light, type Profile, receiverKind, type Triple } from "../src";
 import { carried } from "../src/matrix";
 import { alphaTexture } from "../src/three/textures";
 import type { BallState } from "./ball_state";
@@ -8,8 +8,12 @@ import { checkBlending, type DirectInputs, DirectLight } from "./direct_light";
 import { type AssetFacts, type Facts, type LoadedAsset, loadOne } from "./loading";
 import { FineLightmap, finenessOf } from "./fine_lightmap";
 import { lineOf, say } from "./messages";
+import { PixelLight } from "./pixel_light";
 import { ViewerRelighting } from "./relighting";
 import type { State } from "./state";
+
+/** Where the light is shown: on the texels, on a mesh, or on a mesh whose pixels have direct light of their own. */
+export type Place = "texels" | "mesh" | "pixels";
 
 /** One asset, relit. */
 export class Subject {
@@ -25,9 +29,10 @@ export class Subject {
   private readonly directs = new Map<number, DirectLight>(); // by resolution over the lightmap's, made when first shown
   private readonly fineness: number;
   private fine?: FineLightmap;
+  private pixels?: PixelLight;
   private isFine = false;
-  /** Whether it was last relit for a mesh. */
-  onMesh = false;
+  /** For what it was last relit. */
+  place: Place = "texels";
 
   constructor(loaded: LoadedAsset, renderer: WebGLRenderer) {
     this.facts = loaded.facts;
@@ -77,18 +82,30 @@ export class Subject {
     return tables.centers.filter((direction) => manifest.domain === "sphere" || direction[2] > 0); // some light functions lie past the horizon
   }
 
-  /** Draw the lightmap under `lights`, with the direct shadow of a sphere; `onMesh`: with finer direct light, in `shown`. */
-  relight(lights: readonly Light[], terms: State["terms"], renderer: WebGLRenderer, ball?: BallState, onMesh = false): void {
+  /** Draw the lightmap under `lights`, with the direct shadow of a sphere. On a mesh direct light is finer, in `shown`; at its pixels it is apart. */
+  relight(lights: readonly Light[], terms: State["terms"], renderer: WebGLRenderer, ball?: BallState, place: Place = "texels"): void {
     this.relighting.set(lights);
-    this.onMesh = onMesh;
-    const source = terms === "indirect" ? undefined : this.directAt(onMesh ? this.fineness : 1, renderer);
+    this.place = place;
+    const source = terms === "indirect" || place === "pixels" ? undefined : this.directAt(place === "mesh" ? this.fineness : 1, renderer);
     source?.setBall(ball && { position: carried(this.asset.assetFromWorld, ball.position), size: ball.size });
     const direct = source?.draw(lights);
     const alone = terms === "direct" && direct !== undefined;
-    this.isFine = onMesh && direct !== undefined && this.fineness > 1;
+    this.isFine = place === "mesh" && direct !== undefined && this.fineness > 1;
     this.relighting.add(this.isFine ? undefined : direct, alone && !this.isFine);
     this.relighting.update(renderer);
     if (this.isFine && direct) this.drawFine(renderer, direct, alone);
+  }
+
+  /** Whether direct light can be that of the pixels of a mesh: that of lightmaps. */
+  get hasPixels(): boolean {
+    return this.hasDirect && receiverKind(this.asset.manifest) === "lightmap";
+  }
+
+  /** The direct light of the pixels of `meshes`, with the shadow of a sphere. */
+  pixelLight(meshes: readonly Mesh[], renderer: WebGLRenderer, ball?: BallState): PixelLight {
+    this.pixels ??= new PixelLight(this.asset, this.directInputs as DirectInputs, meshes, renderer);
+    this.pixels.setBall(ball);
+    return this.pixels;
   }
 
   /** Direct light at so many times the lightmap's resolution; undefined where there is none. */

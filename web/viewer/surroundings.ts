@@ -39,6 +39,7 @@ import {
 } from "three";
 import type { EnvironmentLight, PunctualLight, Light } from "../src";
 import { toThree } from "./frames";
+import { PIXEL_LIGHT } from "./pixel_light";
 import type { ScreenUniforms } from "./screen";
 
 const SHADOW_SIZE = 2048;
@@ -267,7 +268,8 @@ in vec2 lightmapUv;
 #ifdef COLORED
 in vec4 color;
 #endif
-uniform mat4 modelViewMatrix, projectionMatrix;
+uniform mat4 modelMatrix, viewMatrix, projectionMatrix, litFromScene;
+out vec3 vPlace;
 #ifdef TEXTURED
 in vec2 surfaceUv;
 uniform mat3 surfaceTransform;
@@ -293,7 +295,9 @@ void main() {
 #ifdef TEXTURED
     vSurfaceUv = (surfaceTransform * vec3(surfaceUv, 1.0)).xy;
 #endif
-    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+    vec4 world = modelMatrix * vec4(position, 1.0);
+    vPlace = (litFromScene * world).xyz;
+    gl_Position = projectionMatrix * viewMatrix * world;
 }`;
 
 const RECEIVER_FRAGMENT = `precision highp float;
@@ -302,7 +306,8 @@ in vec2 vUv;
 in vec3 vColor;
 uniform sampler2D relit, reference, ambient;
 uniform vec3 referenceColor, albedo;
-uniform float split;
+uniform float split, texelShare;
+${PIXEL_LIGHT}
 #ifdef AT_VERTICES
 in vec3 vRelit, vReference, vAmbient;
 #define AT(texels, vertex) vertex
@@ -315,7 +320,7 @@ uniform sampler2D surface;
 #endif
 out vec4 radiance;
 void main() {
-    vec3 light = gl_FragCoord.x < split ? AT(reference, vReference) * referenceColor + AT(ambient, vAmbient) : AT(relit, vRelit);
+    vec3 light = gl_FragCoord.x < split ? AT(reference, vReference) * referenceColor + AT(ambient, vAmbient) : texelShare * AT(relit, vRelit) + directAt();
 #ifdef IRRADIANCE
     light *= albedo * vColor / 3.14159265358979;
 #ifdef TEXTURED

@@ -13,7 +13,7 @@ import { Copy } from "./copy";
 import { Cycles } from "./cycles";
 import { droppedEnvironment, droppedFrames, shineEnvironment } from "./dropped";
 import type { Environment } from "./environment_file";
-import { dragSplit, dropFiles, pickFile } from "./gestures";
+import { dragSplit, dropFiles, onDoubleTap, pickFile } from "./gestures";
 import { History } from "./history";
 import { type DirectionalState, isAimed, isPlaced, lightOf, type LightState, placedOf, type PlacedState, rounded, shiningOf, sunOf } from "./light_state";
 import { listen, tabled } from "./keys";
@@ -24,6 +24,7 @@ import { Measures } from "./measures";
 import { element, lineOf, say } from "./messages";
 import { Panel, type PanelFacts } from "./panel";
 import { Playback } from "./path";
+import { Pace } from "./pixel_light";
 import { Receivers } from "./receivers";
 import { negated } from "./relighting";
 import { saveFrames, savePng, saveRig } from "./saving";
@@ -31,7 +32,7 @@ import { COLORS, screenUniforms, shownAs, VALUES } from "./screen";
 import { directionPoints, DirectionWidget } from "./direction_widget";
 import { Stage } from "./stage";
 import { type Changed, COMPARES, decodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
-import { type Subject, Subjects, weightsFor } from "./subject";
+import { type Place, type Subject, Subjects, weightsFor } from "./subject";
 import { emitting, emittingStates, paint } from "./surface_state";
 import { Surroundings } from "./surroundings";
 
@@ -49,6 +50,7 @@ export class Viewer {
   private readonly receivers: Receivers;
   private readonly playback: Playback;
   private readonly stage: Stage;
+  private readonly pace: Pace;
   private readonly directions: DirectionWidget;
   private readonly panel: Panel;
   private readonly copy: Copy;
@@ -97,7 +99,8 @@ export class Viewer {
     if (facts.cycles) this.cycles = new Cycles(facts.cycles, asset.ambient, { ...waits, shown: () => this.showReference(), switched: () => this.panel.rebuild(), told: () => this.status() });
     model?.applyMatrix4(first.relighting.sceneFromModel());
     const { width, height, quantity } = asset.manifest;
-    this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
+    this.pace = new Pace({ ...waits, changed: () => this.changed({}) });
+    this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed, this.pace);
     if (this.state.view === "scene" && !this.stage.canShowScene) this.state.view = "mesh";
     if (probes && this.stage.canShowMesh) {
       this.ball = new Ball(renderer, new SrbfProbes(probes, { weights: weightsFor(probes, renderer) }), this.uniforms, asset, loaded.first.direct?.scene);
@@ -252,6 +255,7 @@ export class Viewer {
     requestAnimationFrame((next) => this.frame(next));
     const since = now - this.last;
     this.last = now;
+    this.pace.frame(since);
     if (this.state.playing) this.play(since / 1000);
     else this.playback.stop();
     if (!this.drawNeeded) {
@@ -262,7 +266,7 @@ export class Viewer {
     if (this.paces.length > PACES) this.paces.shift();
     this.drawNeeded = false;
     try {
-      if (this.lightsChanged || this.subject.onMesh !== this.showsFine()) this.relight();
+      if (this.lightsChanged || this.subject.place !== this.shownAt()) this.relight();
       this.lightsChanged = false;
       this.present();
       this.error = "";
@@ -282,7 +286,7 @@ export class Viewer {
   private play(seconds: number): void {
     if (this.state.turntable && this.stage.hasMesh) {
       this.stage.turn((Math.PI * Math.min(seconds, 0.25)) / this.state.seconds);
-      this.changed({});
+      this.pace.moved();
     }
     if (this.state.path === "frames") this.playFrames(seconds);
     else if (this.playback.advance(seconds)) this.changed({ lights: true });
@@ -307,7 +311,11 @@ export class Viewer {
     const { ball } = this.state;
     const shown = this.ball && ball?.on && !comparing ? ball : undefined;
     const began = performance.now();
-    this.subject.relight(this.shining, terms, this.renderer, shown, this.showsFine());
+    const place = this.shownAt();
+    this.subject.relight(this.shining, terms, this.renderer, shown, place);
+    const atPixels = place === "pixels" && terms !== "indirect";
+    this.stage.pixelLight = atPixels ? this.subject.pixelLight(this.stage.lit, this.renderer, shown) : undefined;
+    this.uniforms.texelShare.value = atPixels && terms === "direct" ? 0 : 1;
     // what reads the pixels waits for the GPU
     if (this.besideCycles) this.cycles?.measure(this.copy.read(this.renderer, this.subject.lightmap), (texel) => this.receivers.covered(texel), performance.now() - began);
     this.uniforms.relit.value = this.subject.shown;
@@ -324,9 +332,10 @@ export class Viewer {
     this.outside = line;
   }
 
-  /** Whether a mesh is shown, whose direct light may be finer than its lightmap. */
-  private showsFine(): boolean {
-    return this.stage.hasMesh && this.state.show === "picture" && !this.comparing();
+  /** Where the picture shows light. A mesh has finer direct light than its lightmap, and at its pixels where that is fast enough. */
+  private shownAt(): Place {
+    if (!this.stage.hasMesh || this.state.show !== "picture" || this.comparing()) return "texels";
+    return this.subject.hasPixels && !this.besideCycles && this.pace.isFast ? "pixels" : "mesh";
   }
 
   private showReference(): void {
@@ -441,12 +450,7 @@ export class Viewer {
       },
     });
     const canvas = this.renderer.domElement;
-    let tapped = 0;
-    canvas.addEventListener("pointerup", (event) => {
-      if (event.pointerType !== "mouse" && event.timeStamp - tapped < 300) this.place(event.offsetX, event.offsetY);
-      tapped = event.timeStamp;
-    });
-    canvas.addEventListener("dblclick", (event) => this.place(event.offsetX, event.offsetY));
+    onDoubleTap(canvas, (x, y) => this.place(x, y));
     canvas.addEventListener("webglcontextlost", () => say("the GPU context was lost: reload the page"));
     dragSplit(this.state, changed);
     dropFiles((file) => void (file.name.endsWith(".json") ? this.frames(file) : this.environment(file)));
