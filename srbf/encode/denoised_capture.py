@@ -30,6 +30,8 @@ SHOWN = 24  # leading components that may hold some of the picture
 NOISES = 16  # random combinations of the images without these
 LEAST_NOISE = 1e-6  # of the median texel's, so that a black texel has a scale
 
+Axes = Float32[ndarray, "S N"]  # of responses, N = 3 L numbers
+
 
 @dataclass(frozen=True, eq=False)
 class DenoisedCapture(Capture):
@@ -100,34 +102,63 @@ class DenoisedCapture(Capture):
         return replace(self, lights=lights, of=self.of._of(lights, chosen))
 
 
-def denoised(capture: Capture) -> DenoisedCapture | None:
+def denoised(capture: Capture, axes: Axes | None = None) -> DenoisedCapture | None:
     """The capture without the noise of its train images; None where it has no positions and normals, or hardly any texels.
 
-    A sample and a pass of the train images are read. Memory: some 0.5 kB per texel while the filter is made, then 136 bytes; and 12 bytes
-    per light and sampled texel.
+    A sample and a pass of the train images are read, with `axes` of them the pass alone. Memory: some 0.5 kB per texel while the filter is
+    made, then 136 bytes; and 12 bytes per light and sampled texel.
     """
-    positions, normals = capture.geometry("position"), capture.geometry("normal")
+    surface = Surface.of(capture)
     texels = np.flatnonzero(capture.coverage().ravel() >= COVERED)
-    if positions is None or normals is None or len(texels) <= NEIGHBORS:
-        return None
-    neighbors = Neighbors.of(positions.reshape(-1, 3)[texels], normals.reshape(-1, 3)[texels])
-    shown, noise = _features(capture, texels)
-    squares, enough = off_planes(neighbors, shown), neighbors.enough
-    if not enough.any():
-        return None
-    local = neighbors.median((noise**2).mean(axis=1))
-    local = np.maximum(local, LEAST_NOISE * max(float(np.median(local)), 1e-30))[:, None]
-    variance = local * (np.median((squares / local)[enough], axis=0) / np.float32(MEDIAN))
-    return DenoisedCapture(capture.folder, capture.manifest, capture.lights, capture, texels, plane_filter(neighbors, shown, variance))
+    return None if surface is None else surface.denoised(capture, texels, leading_axes(capture) if axes is None else axes)
 
 
-def _features(capture: Capture, texels: Int[ndarray, " n"]) -> tuple[Float32[ndarray, "n G"], Float32[ndarray, "n N"]]:
-    """(leading components of the train images, combinations of them that are hardly more than noise) at `texels`."""
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Places (m) and unit normals of all texels of a capture."""
+
+    positions: Float32[ndarray, "P 3"]
+    normals: Float32[ndarray, "P 3"]
+
+    @staticmethod
+    def of(capture: Capture) -> Surface | None:
+        """None where the capture lacks them."""
+        positions, normals = capture.geometry("position"), capture.geometry("normal")
+        return None if positions is None or normals is None else Surface(positions.reshape(-1, 3), normals.reshape(-1, 3))
+
+    def denoised(
+        self, capture: Capture, texels: Int[ndarray, " n"], axes: Axes, places: Int[ndarray, " n"] | None = None
+    ) -> DenoisedCapture | None:
+        """`capture` without the noise of its train images at `texels`; `places`: among all texels, where it holds some of these alone.
+
+        None of hardly any texels.
+        """
+        own = texels if places is None else places
+        if len(texels) <= NEIGHBORS:
+            return None
+        neighbors = Neighbors.of(self.positions[own], self.normals[own])
+        shown, noise = _features(capture, texels, axes)
+        squares, enough = off_planes(neighbors, shown), neighbors.enough
+        if not enough.any():
+            return None
+        local = neighbors.median((noise**2).mean(axis=1))
+        local = np.maximum(local, LEAST_NOISE * max(float(np.median(local)), 1e-30))[:, None]
+        variance = local * (np.median((squares / local)[enough], axis=0) / np.float32(MEDIAN))
+        rows = plane_filter(neighbors, shown, variance)
+        return DenoisedCapture(capture.folder, capture.manifest, capture.lights, capture, texels, rows)
+
+
+def leading_axes(capture: Capture) -> Axes:
+    """The SHOWN leading axes of the train images' responses about their mean, of a sample of the texels."""
     train = capture.indices("train")
     rows = capture.sample(train, sampled_texels(capture, SAMPLE_TEXELS)).reshape(-1, 3 * len(train))
     rows -= rows.mean(axis=0)
-    axes, _ = principal_axes(rows, min(SHOWN, rows.shape[1] - 1))
-    del rows
+    return principal_axes(rows, min(SHOWN, rows.shape[1] - 1))[0]
+
+
+def _features(capture: Capture, texels: Int[ndarray, " n"], axes: Axes) -> tuple[Float32[ndarray, "n G"], Float32[ndarray, "n E"]]:
+    """(leading components of the train images, combinations of them that are hardly more than noise) at `texels`."""
+    train = capture.indices("train")
     random = np.random.default_rng(0).standard_normal((NOISES, axes.shape[1]), np.float32)
     random -= random @ axes.T @ axes
     product = StreamedProduct(np.concatenate([axes[:GUIDES], random]).reshape(-1, len(train), 3))

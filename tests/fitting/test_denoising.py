@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NoReturn, cast
 
+import numpy as np
 import pytest
 from made_lightmaps import floor_capture
 
@@ -15,6 +16,7 @@ from srbf.captured_light import LightKind
 from srbf.encode.denoised_capture import DenoisedCapture
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
+from srbf.fitting import denoising
 from srbf.fitting.denoising import Denoise, filtered
 from srbf.fitting.options import encode
 from srbf.methods.eigen_map import EigenMap
@@ -86,3 +88,16 @@ def test_patches_are_denoised_and_point_lights_are_not(make_capture: Make) -> No
     assert filtered(METHOD, points) is points
     with pytest.raises(InputError, match="found point lights; leave it out"):
         filtered(METHOD, points, "on")
+
+
+def test_tiles_of_a_large_lightmap_tell_as_well(make_capture: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"FEW_TEXELS": 200, "TRIED_TEXELS": 128, "TILE": 8, "MARGIN": 3, "TILES": 2}.items():
+        monkeypatch.setattr(denoising, name, value)
+    texels, inside = denoising._tiles(np.ones((64, 64), bool))
+    assert 128 <= inside.sum() < len(texels) < 1500
+    assert len(np.unique(texels // 64)) <= 32, "of two strips of rows"
+    said: list[str] = []
+    noisy, clean = floor_capture(make_capture, 0.4), floor_capture(make_capture, 0.0, name="clean")
+    assert isinstance(filtered(METHOD, noisy, say=said.append), DenoisedCapture)
+    assert filtered(METHOD, clean, say=said.append) is clean
+    assert [line.partition(":")[0] for line in said] == ["denoised", "not denoised"]
