@@ -16,6 +16,7 @@ ROUND = math.sqrt(math.pi) / 2  # side of a square of the area of a disk of diam
 SAME = 1e-5  # m: sides of an area that are equal
 LINKS = {"receivers": "receiver_collection", "blockers": "blocker_collection"}
 NOTHING = "srbf nothing"  # an object that nothing renders
+OWN = "srbf_rig"  # property of collections that a file's choices made
 
 
 class RigError(Exception):
@@ -40,7 +41,7 @@ def take(scene: bpy.types.Scene, frame: dict[str, Any]) -> tuple[int, list[str]]
 
     Place, orientation, color, power, size, cone and visibility are set. Suns keep their place, disks their shape; suns without an `angle`
     keep theirs, spots without a `size` their radius. Lights are linked to the objects that the file names, by collections of their own;
-    where it names none, those of a former file go, and the scene's own stay.
+    where it names none, those of a former file go, and the scene's own stay that no file has replaced.
 
     Power then includes exposure, temperature and nodes, which are off. RigError for lights without the values of their kind.
     """
@@ -57,9 +58,9 @@ def take(scene: bpy.types.Scene, frame: dict[str, Any]) -> tuple[int, list[str]]
             continue
         try:
             _set(found, light)
-        except (KeyError, TypeError, ValueError) as error:
+            notes += _link(scene, found, light)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise RigError(f"expected the values of a {light['kind']} light for {light['name']!r}, found others ({error})") from error
-        notes += _link(scene, found, light)
         found.hide_render = found.hide_viewport = False
         count += 1
     for name in frame.get("off", ()):
@@ -120,10 +121,11 @@ def _link(scene: bpy.types.Scene, obj: bpy.types.Object, light: dict[str, Any]) 
     notes = []
     for link, place in LINKS.items():
         present, name = getattr(linking, place), f"srbf {obj.name} {link}"
-        own = present if present is not None and present.name == name else None
-        if own is not None:
-            bpy.data.collections.remove(own)
-        if link in light:
+        if present is not None and (present.get(OWN) or present.name == name):
+            setattr(linking, place, None)
+            if present.users == 0:  # no copy of the light has it
+                bpy.data.collections.remove(present)
+        if light.get(link) is not None:
             collection, missing = _collection(scene, name, light[link])
             setattr(linking, place, collection)
             notes += [f"{obj.name!r} is linked to {one!r}, which this scene lacks" for one in missing]
@@ -133,6 +135,7 @@ def _link(scene: bpy.types.Scene, obj: bpy.types.Object, light: dict[str, Any]) 
 def _collection(scene: bpy.types.Scene, name: str, choice: dict[str, list[str]]) -> tuple[bpy.types.Collection, list[str]]:
     """Of `only` some objects, `without` others; and the names that the scene lacks."""
     made = bpy.data.collections.new(name)
+    made[OWN] = True
     states = dict.fromkeys(choice.get("only", ()), "INCLUDE") | dict.fromkeys(choice.get("without", ()), "EXCLUDE")
     for one in states:
         if one in scene.objects:

@@ -195,12 +195,12 @@ def run_demo(
     if is_split:
         whole = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), direct=direct, roles=("holdout",))
     timings["evaluate"] = clock() - started
+    page = reported(asset, capture, folder, errors, timings, reporter, not (is_split and quality == "draft"))
     fits = {} if is_split else {"maps": RelightingMap(k=MAPS)}
     if quality == "publish" and not is_split:
         fits = {"fine": RelightingMap(k=FINE_MAPS, encoding="uint8"), **fits}
     for fit, maps in fits.items():
         encode(maps, capture, FitRun(say=reporter.say)).save(folder / fit, force=True)
-    page = reported(asset, capture, folder, errors, timings, reporter, not (is_split and quality == "draft"))
     holdout, size = whole["holdout"], asset.bytes_per_texel()["directional"]
     with_direct = ", direct light included" if is_split else ""
     reporter.say(

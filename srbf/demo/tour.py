@@ -108,8 +108,9 @@ class _Tour:
     def check_quality(self) -> None:
         """InputError where a finished scene has another quality."""
         for stop in STOPS:
-            quality = (self._found(stop) or {}).get("quality", self._quality)
-            if quality != self._quality:
+            found = self._found(stop) or {}
+            quality = found.get("quality", self._quality)
+            if quality != self._quality and found.get("srbf") == srbf.__version__:
                 raise InputError(
                     f"expected quality {quality}, that of the scenes in {self._folder}, found {self._quality}; "
                     "choose another folder, or delete it"

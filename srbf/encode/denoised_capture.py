@@ -102,15 +102,15 @@ class DenoisedCapture(Capture):
         return replace(self, lights=lights, of=self.of._of(lights, chosen))
 
 
-def denoised(capture: Capture, axes: Axes | None = None) -> DenoisedCapture | None:
+def denoised(capture: Capture) -> DenoisedCapture | None:
     """The capture without the noise of its train images; None where it has no positions and normals, or hardly any texels.
 
-    A sample and a pass of the train images are read, with `axes` of them the pass alone. Memory: some 0.5 kB per texel while the filter is
-    made, then 136 bytes; and 12 bytes per light and sampled texel.
+    A sample and a pass of the train images are read. Memory: some 0.5 kB per texel while the filter is made, then 136 bytes; and 12 bytes
+    per light and sampled texel.
     """
     surface = Surface.of(capture)
     texels = np.flatnonzero(capture.coverage().ravel() >= COVERED)
-    return None if surface is None else surface.denoised(capture, texels, leading_axes(capture) if axes is None else axes)
+    return None if surface is None else surface.denoised(capture, texels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +126,7 @@ class Surface:
         positions, normals = capture.geometry("position"), capture.geometry("normal")
         return None if positions is None or normals is None else Surface(positions.reshape(-1, 3), normals.reshape(-1, 3))
 
-    def denoised(
-        self, capture: Capture, texels: Int[ndarray, " n"], axes: Axes, places: Int[ndarray, " n"] | None = None
-    ) -> DenoisedCapture | None:
+    def denoised(self, capture: Capture, texels: Int[ndarray, " n"], places: Int[ndarray, " n"] | None = None) -> DenoisedCapture | None:
         """`capture` without the noise of its train images at `texels`; `places`: among all texels, where it holds some of these alone.
 
         None of hardly any texels.
@@ -137,7 +135,7 @@ class Surface:
         if len(texels) <= NEIGHBORS:
             return None
         neighbors = Neighbors.of(self.positions[own], self.normals[own])
-        shown, noise = _features(capture, texels, axes)
+        shown, noise = _features(capture, texels, _leading_axes(capture))
         squares, enough = off_planes(neighbors, shown), neighbors.enough
         if not enough.any():
             return None
@@ -148,7 +146,7 @@ class Surface:
         return DenoisedCapture(capture.folder, capture.manifest, capture.lights, capture, texels, rows)
 
 
-def leading_axes(capture: Capture) -> Axes:
+def _leading_axes(capture: Capture) -> Axes:
     """The SHOWN leading axes of the train images' responses about their mean, of a sample of the texels."""
     train = capture.indices("train")
     rows = capture.sample(train, sampled_texels(capture, SAMPLE_TEXELS)).reshape(-1, 3 * len(train))

@@ -11,7 +11,8 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float64, Int
 from srbf.capture import COVERED, Capture
-from srbf.encode.denoised_capture import Axes, Surface, denoised, leading_axes
+from srbf.encode.denoised_capture import Surface, denoised
+from srbf.encode.plane_filter import NEIGHBORS
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.light_images import STRIP
@@ -19,8 +20,9 @@ from srbf.methods.protocol import Method
 
 Denoise = Literal["auto", "on", "off"]
 
-TRIED_TEXELS = 1 << 13
-FEW_TEXELS = 1 << 15  # that are tried from among all
+TRIED_TEXELS = 1 << 13  # at most, by which two fits are compared
+FEW_TEXELS = 1 << 15  # a lightmap of no more is not cut into tiles
+FEWEST_TEXELS = 1 << 10  # within tiles
 TILE, MARGIN = 32, 4  # texels: how wide tiles are, and how many about them they are filtered with
 TILES = 4  # a strip of rows
 FEWEST_LIGHTS = 4  # validation lights whose gains tell how far they scatter
@@ -49,7 +51,7 @@ def filtered(
     if denoise == "on":
         clean = denoised(capture)
         if clean is None:
-            raise InputError(f"expected positions and normals of a lightmap's texels for `denoise=on`, found none in {capture.folder}")
+            raise InputError(f"expected texels with positions and normals for `denoise=on`, found none or hardly any in {capture.folder}")
         return clean
     part = _Part.of(capture)
     if part is None:
@@ -60,7 +62,7 @@ def filtered(
     pooled = 20 * float(np.log10(np.linalg.norm(before) / max(float(np.linalg.norm(after)), 1e-30)))
     kept = float(gains.mean()) > least and pooled > WORTH
     verb = "gain" if kept else "would change by"
-    clean = denoised(capture, part.axes) if kept else None
+    clean = denoised(capture) if kept else None
     say(f"{'denoised' if kept else 'not denoised'}: validation lights of a sample {verb} {gains.mean():.2f} dB, {pooled:.2f} dB pooled")
     return clean or capture
 
@@ -84,7 +86,6 @@ class _Part:
 
     noisy: Capture
     quiet: Capture
-    axes: Axes
     tried: Int[ndarray, " n"]
     covered: int
 
@@ -96,16 +97,17 @@ class _Part:
             return None
         covered = capture.coverage() >= COVERED
         texels, inside = _tiles(covered)
+        if len(texels) <= NEIGHBORS:
+            return None
         roles = [None if light.role == "holdout" else light.role for light in capture.lights]
         noisy = capture.with_roles(roles).load(texels)
-        axes = leading_axes(noisy)
-        quiet = surface.denoised(noisy, np.arange(len(texels)), axes, texels)
+        quiet = surface.denoised(noisy, np.arange(len(texels)), texels)
         if quiet is None:
             return None
         tried = np.flatnonzero(inside)
         if len(tried) > TRIED_TEXELS:
             tried = np.sort(np.random.default_rng(0).choice(tried, TRIED_TEXELS, replace=False))
-        return _Part(noisy, quiet, axes, tried, int(np.count_nonzero(covered)))
+        return _Part(noisy, quiet, tried, int(np.count_nonzero(covered)))
 
     def errors(self, method: Method) -> tuple[Float64[ndarray, " V"], Float64[ndarray, " V"]]:
         """RMSE under each validation light of a fit to the texels, with noise and without."""
@@ -140,7 +142,7 @@ def _tiles(covered: Bool[ndarray, "H W"]) -> tuple[Int[ndarray, " n"], Bool[ndar
             around[rows, max(0, left - MARGIN) : min(width, left + TILE + MARGIN)] = True
         if np.count_nonzero(inside & covered) >= TRIED_TEXELS:
             break
-    else:
+    if np.count_nonzero(inside & covered) < FEWEST_TEXELS:
         return texels, np.ones(len(texels), bool)
     texels = np.flatnonzero(around & covered)
     return texels, inside.ravel()[texels]

@@ -11,7 +11,7 @@ import pytest
 from made_lightmaps import floor_capture
 
 from srbf.asset import Asset
-from srbf.capture import Capture
+from srbf.capture import Capture, InMemoryCapture
 from srbf.captured_light import LightKind
 from srbf.encode.denoised_capture import DenoisedCapture
 from srbf.errors import InputError
@@ -91,7 +91,7 @@ def test_patches_are_denoised_and_point_lights_are_not(make_capture: Make) -> No
 
 
 def test_tiles_of_a_large_lightmap_tell_as_well(make_capture: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in {"FEW_TEXELS": 200, "TRIED_TEXELS": 128, "TILE": 8, "MARGIN": 3, "TILES": 2}.items():
+    for name, value in {"FEW_TEXELS": 200, "TRIED_TEXELS": 128, "TILE": 8, "MARGIN": 3, "TILES": 2, "FEWEST_TEXELS": 8}.items():
         monkeypatch.setattr(denoising, name, value)
     texels, inside = denoising._tiles(np.ones((64, 64), bool))
     assert 128 <= inside.sum() < len(texels) < 1500
@@ -101,3 +101,22 @@ def test_tiles_of_a_large_lightmap_tell_as_well(make_capture: Make, monkeypatch:
     assert isinstance(filtered(METHOD, noisy, say=said.append), DenoisedCapture)
     assert filtered(METHOD, clean, say=said.append) is clean
     assert [line.partition(":")[0] for line in said] == ["denoised", "not denoised"]
+    chosen, whole = filtered(METHOD, noisy), filtered(METHOD, noisy, "on")
+    assert isinstance(chosen, DenoisedCapture) and isinstance(whole, DenoisedCapture)
+    assert (chosen.rows != whole.rows).nnz == 0, "tiles choose, but what other texels show guides the filter, too"
+
+
+def test_texels_that_fill_no_tiles_are_tried_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(denoising, "FEW_TEXELS", 200)
+    thin = np.zeros((64, 64), bool)
+    thin[::16] = True  # in the margins of all tiles
+    texels, inside = denoising._tiles(thin)
+    assert len(texels) == thin.sum() and inside.all()
+
+
+def test_nothing_covered_is_left_to_the_fit_to_refuse(make_capture: Make) -> None:
+    capture = floor_capture(make_capture, 0.4)
+    loaded = capture.load()
+    assert isinstance(loaded, InMemoryCapture)
+    bare = replace(loaded, covered=np.zeros((capture.height, capture.width), np.float32))
+    assert filtered(METHOD, bare) is bare

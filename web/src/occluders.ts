@@ -94,6 +94,7 @@ export class Occluders {
     };
     let found = this.former;
     let least = squaredDistance(triangles, 9 * found, x, y, z);
+    if (Number.isNaN(least)) return -1;
     const touching = (TOUCHING * (1 + Math.abs(x) + Math.abs(y) + Math.abs(z))) ** 2;
     let top = 0;
     stack[top++] = 0;

@@ -94,12 +94,12 @@ export class DirectLight {
     this.points = once(() => new PointShadows(renderer, this.lit, casters, center));
   }
 
-  /** What points are less, meters, in the asset's frame. */
+  /** Origin of the points, meters, in the asset's frame. */
   get center(): Triple {
     return this.receivers.center;
   }
 
-  /** Of `ofPixels`, whose textures have changed: how many pixels there are now. */
+  /** The pixels of `ofPixels` have changed: how many there are now. */
   resize(width: number, height: number): void {
     this.sum.setSize(width, height);
     this.drawn = "";

@@ -12,6 +12,14 @@ export function chip(text: string, act: () => void): HTMLButtonElement {
   return made;
 }
 
+const hints = new Map<string, string | undefined>();
+
+/** Say `line`, of a `subject` about which nothing was to be said before. */
+export function hintOnce(subject: string, line: string | undefined): void {
+  if (line && !hints.get(subject)) say(line, "hint");
+  hints.set(subject, line);
+}
+
 export function say(message: string, kind: "toast" | "hint" = "toast"): void {
   const place = element(kind);
   place.textContent = message;

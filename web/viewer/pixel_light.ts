@@ -26,9 +26,6 @@ import { undisturbed } from "../src/three/fullscreen";
 import type { BallState } from "./ball_state";
 import { type DirectInputs, DirectLight, reflectanceOf } from "./direct_light";
 
-const SLOW = 60; // milliseconds a frame, from which on a moving camera sees the texels' light instead
-const REST = 150; // milliseconds without a move, after which a camera is at rest
-
 const VERTEX = `precision highp float;
 in vec3 position, normal;
 in vec2 lightmapUv;
@@ -134,7 +131,7 @@ export class PixelLight {
       if (renderer.extensions.has("OES_texture_float_linear")) made.magFilter = made.minFilter = LinearFilter;
       return made;
     };
-    const uniforms = { litFromScene: { value: this.litFromScene }, bakedNormal: { value: smooth(baked) }, bakedReflectance: { value: smooth(reflectanceOf(asset, inputs.albedo, 1)) } };
+    const uniforms = { litFromScene: { value: this.litFromScene }, bakedNormal: { value: smooth(baked) }, bakedReflectance: { value: asset.manifest.quantity === "irradiance" ? floatTexture(new Float32Array([1, 1, 1, 1]), 1, 1) : smooth(reflectanceOf(asset, inputs.albedo, 1)) } };
     const material = (side: Side) => new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms, side });
     this.materials = { front: material(FrontSide), both: material(DoubleSide) };
     for (const mesh of meshes) {
@@ -152,9 +149,17 @@ export class PixelLight {
     this.light.setBall(ball && { position: carried(this.asset.assetFromWorld, ball.position), size: ball.size });
   }
 
+  /** Give its pixels' memory back until it is drawn again. */
+  rest(): void {
+    this.surfaces.setSize(1, 1);
+    this.light.resize(1, 1);
+    this.drawn = "";
+  }
+
   /** Put the light of `lights` at the pixels that `camera` sees into `uniforms`; whether these are others than before, and it was drawn again. */
   draw(uniforms: ReturnType<typeof pixelUniforms>, lights: readonly Light[], camera: PerspectiveCamera, { width, height, sides }: Seen): boolean {
     const { renderer, surfaces, light } = this;
+    camera.updateMatrixWorld(); // as three does before it draws
     const state = JSON.stringify([camera.matrixWorld.elements, camera.projectionMatrix.elements, width, height, sides]);
     const changed = state !== this.drawn;
     if (changed) {
@@ -173,41 +178,5 @@ export class PixelLight {
     uniforms.directPoints.value = surfaces.textures[0];
     uniforms.litFromScene.value = this.litFromScene;
     return changed;
-  }
-}
-
-/** Whether the light of pixels is fast enough for a camera that moves, and whether it does. */
-export class Pace {
-  private milliseconds = 0; // of the last frame that drew it
-  private hasDrawn = false;
-  private rest: ReturnType<typeof setTimeout> | undefined;
-
-  constructor(private readonly page: { wait: () => void; done: () => void; changed: () => void }) {}
-
-  /** The camera has moved. */
-  moved(): void {
-    if (this.rest === undefined) this.page.wait();
-    clearTimeout(this.rest);
-    this.rest = setTimeout(() => {
-      this.rest = undefined;
-      this.page.done();
-      this.page.changed();
-    }, REST);
-    this.page.changed();
-  }
-
-  /** A frame begins, so long after the one before. */
-  frame(milliseconds: number): void {
-    if (this.hasDrawn) this.milliseconds = milliseconds;
-    this.hasDrawn = false;
-  }
-
-  /** The light of pixels was drawn in this frame. */
-  drew(): void {
-    this.hasDrawn = true;
-  }
-
-  get isFast(): boolean {
-    return this.rest === undefined || this.milliseconds < SLOW;
   }
 }

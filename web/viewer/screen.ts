@@ -1,4 +1,4 @@
-/** What the screen shows per texel: the relit picture, a coefficient map, or the difference to the reference; exposure, tone, false color. */
+/** What the screen shows per texel, with direct light per pixel: the relit picture, a coefficient map, or the difference to the reference; exposure, tone, false color. */
 import { Color, GLSL3, type IUniform, RawShaderMaterial, ShaderChunk, type Texture, Vector2, Vector4 } from "three";
 import type { SrbfTextures } from "../src/three";
 import { PIXEL_LIGHT, pixelUniforms } from "./pixel_light";

@@ -23,8 +23,9 @@ import type { Ball } from "./ball";
 import { type FittedCamera, fromThree, toThree, viewCamera } from "./frames";
 import { PointLightGizmos } from "./point_light_gizmos";
 import { rounded } from "./light_state";
+import type { Movement } from "./movement";
 import { panAndZoom } from "./pan_zoom";
-import { byTexels, type Pace, type PixelLight } from "./pixel_light";
+import { byTexels, type PixelLight } from "./pixel_light";
 import type { Receivers } from "./receivers";
 import { BACKGROUND, COLORS, screenMaterial, type ScreenUniforms, VALUES } from "./screen";
 import type { Changed, State } from "./state";
@@ -62,7 +63,7 @@ export class Stage {
     private readonly model: Object3D | undefined,
     quantity: "irradiance" | "radiance",
     changed: Changed,
-    private readonly pace: Pace,
+    private readonly movement: Movement,
   ) {
     this.quad = new Mesh(new PlaneGeometry(2, 2), screenMaterial(uniforms, "picture"));
     this.quad.frustumCulled = false;
@@ -81,7 +82,8 @@ export class Stage {
     this.placeCamera();
     this.orbit.addEventListener("change", () => {
       this.state.eye = [rounded(fromThree(this.orbitCamera.position)), rounded(fromThree(this.orbit.target))];
-      pace.moved();
+      movement.moved();
+      changed();
     });
     this.gizmos = new PointLightGizmos(this.orbitCamera, canvas, state, receivers.bounds, changed, (dragging) => {
       this.orbit.enabled = !dragging && this.hasMesh;
@@ -246,7 +248,7 @@ export class Stage {
     this.placeBall();
     this.uniforms.atPixels.value = this.pixelLight !== undefined;
     const sides = this.state.cut ? "front" : this.inScene ? "as in the file" : "both";
-    if (this.pixelLight?.draw(this.uniforms, lights, this.orbitCamera, { width, height, sides })) this.pace.drew();
+    if (this.pixelLight?.draw(this.uniforms, lights, this.orbitCamera, { width, height, sides })) this.movement.drew();
     const whole = this.inScene ? (this.surroundings as Surroundings).draw(this.orbitCamera, lights, behind, width, height) : undefined;
     this.developedFrom.value = whole ?? null;
     renderer.autoClear = true;

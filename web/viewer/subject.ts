@@ -108,6 +108,11 @@ export class Subject {
     return this.pixels;
   }
 
+  /** Give the memory of pixels back while another asset is shown. */
+  restPixels(): void {
+    this.pixels?.rest();
+  }
+
   /** Direct light at so many times the lightmap's resolution; undefined where there is none. */
   private directAt(factor: number, renderer: WebGLRenderer): DirectLight | undefined {
     if (!this.directInputs) return undefined;

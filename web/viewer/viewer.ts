@@ -21,10 +21,10 @@ import { FRAMES_PER_SECOND, type Keyframes } from "./keyframes";
 import { checkGpu, type Loaded } from "./loading";
 import { mapRange, showMap } from "./map_range";
 import { Measures } from "./measures";
-import { element, lineOf, say } from "./messages";
+import { element, hintOnce, lineOf, say } from "./messages";
+import { Movement } from "./movement";
 import { Panel, type PanelFacts } from "./panel";
 import { Playback } from "./path";
-import { Pace } from "./pixel_light";
 import { Receivers } from "./receivers";
 import { negated } from "./relighting";
 import { saveFrames, savePng, saveRig } from "./saving";
@@ -50,7 +50,7 @@ export class Viewer {
   private readonly receivers: Receivers;
   private readonly playback: Playback;
   private readonly stage: Stage;
-  private readonly pace: Pace;
+  private readonly movement: Movement;
   private readonly directions: DirectionWidget;
   private readonly panel: Panel;
   private readonly copy: Copy;
@@ -58,7 +58,6 @@ export class Viewer {
   private readonly cycles?: Cycles;
   private readonly ball?: Ball;
   private keyframes?: Keyframes;
-  private outside = "";
   private shining: Light[] = [];
   private readonly environments: Map<string, Environment>;
   private lightsChanged = true;
@@ -99,8 +98,8 @@ export class Viewer {
     if (facts.cycles) this.cycles = new Cycles(facts.cycles, asset.ambient, { ...waits, shown: () => this.showReference(), switched: () => this.panel.rebuild(), told: () => this.status() });
     model?.applyMatrix4(first.relighting.sceneFromModel());
     const { width, height, quantity } = asset.manifest;
-    this.pace = new Pace({ ...waits, changed: () => this.changed({}) });
-    this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed, this.pace);
+    this.movement = new Movement({ ...waits, changed });
+    this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed, this.movement);
     if (this.state.view === "scene" && !this.stage.canShowScene) this.state.view = "mesh";
     if (probes && this.stage.canShowMesh) {
       this.ball = new Ball(renderer, new SrbfProbes(probes, { weights: weightsFor(probes, renderer) }), this.uniforms, asset, loaded.first.direct?.scene);
@@ -184,6 +183,7 @@ export class Viewer {
       .get(index)
       .then((subject) => {
         if (this.state.asset !== index) return;
+        this.subject.restPixels();
         this.subject = subject;
         const { layers, ambient } = subject.relighting.textures;
         this.uniforms.relit.value = subject.lightmap;
@@ -241,6 +241,7 @@ export class Viewer {
     this.drawNeeded = true;
     document.body.dataset.state = "busy";
     if (what.lights) this.lightsChanged = true;
+    if (what.lights && this.subject.hasPixels) this.movement.moved();
     this.history.touch();
     if (what.panel) this.panel.rebuild();
     this.address.touch();
@@ -255,7 +256,7 @@ export class Viewer {
     requestAnimationFrame((next) => this.frame(next));
     const since = now - this.last;
     this.last = now;
-    this.pace.frame(since);
+    this.movement.frame(since);
     if (this.state.playing) this.play(since / 1000);
     else this.playback.stop();
     if (!this.drawNeeded) {
@@ -286,7 +287,8 @@ export class Viewer {
   private play(seconds: number): void {
     if (this.state.turntable && this.stage.hasMesh) {
       this.stage.turn((Math.PI * Math.min(seconds, 0.25)) / this.state.seconds);
-      this.pace.moved();
+      this.movement.moved();
+      this.changed({});
     }
     if (this.state.path === "frames") this.playFrames(seconds);
     else if (this.playback.advance(seconds)) this.changed({ lights: true });
@@ -320,22 +322,15 @@ export class Viewer {
     if (this.besideCycles) this.cycles?.measure(this.copy.read(this.renderer, this.subject.lightmap), (texel) => this.receivers.covered(texel), performance.now() - began);
     this.uniforms.relit.value = this.subject.shown;
     if (shown) this.ball?.relight(this.shining, this.state.surfaces, terms, shown);
-    this.tellOutside();
+    hintOnce("outside", outsideLine(this.subject.asset, this.state.lights));
     const light = this.comparable();
     if (comparing && light && this.comparison.compared >= 0) this.comparison.measure(this.subject, light, this.renderer);
-  }
-
-  /** Say once that a light is outside the free places of an asset of lights inside the scene. */
-  private tellOutside(): void {
-    const line = outsideLine(this.subject.asset, this.state.lights);
-    if (line && !this.outside) say(line, "hint");
-    this.outside = line;
   }
 
   /** Where the picture shows light. A mesh has finer direct light than its lightmap, and at its pixels where that is fast enough. */
   private shownAt(): Place {
     if (!this.stage.hasMesh || this.state.show !== "picture" || this.comparing()) return "texels";
-    return this.subject.hasPixels && !this.besideCycles && this.pace.isFast ? "pixels" : "mesh";
+    return this.subject.hasPixels && !this.besideCycles && this.movement.allowsPixels ? "pixels" : "mesh";
   }
 
   private showReference(): void {
