@@ -8,6 +8,7 @@ import pkgutil
 import signal
 import sys
 from collections.abc import Callable, Generator, Iterator
+from functools import partial
 from pathlib import Path
 
 # Before numpy loads: one thread per test process for BLAS, OpenMP and Mesa's software renderer, or the processes of -n wait for each other.
@@ -37,8 +38,9 @@ from made_captures import write_capture  # noqa: E402
 
 from srbf.asset import Asset  # noqa: E402
 from srbf.capture import Capture  # noqa: E402
-from srbf.encode import position_table  # noqa: E402
+from srbf.encode import light_function_fit, model_selection, position_table  # noqa: E402
 from srbf.export import loss  # noqa: E402
+from srbf.methods import relighting_map  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
 
@@ -100,6 +102,32 @@ def coarse_tables_of_places_and_losses() -> Iterator[None]:
         patch.setattr(position_table, "MOST_NODES", 128)
         patch.setattr(loss, "LIGHTS", 12)
         yield
+
+
+SELECTION: dict[tuple[object, str], object] = {
+    (light_function_fit, "SPREADS"): (0.7, 1.42, 2.0),
+    (light_function_fit, "NARROW"): (0.7,),
+    (light_function_fit, "WIDE"): (2.0,),
+    (light_function_fit, "WIDE_SHARES"): (0.99,),
+    (relighting_map, "spread_candidates"): partial(model_selection.spread_candidates, factors=model_selection.SPREADS[::4]),
+}
+SHIPPED = {(where, name): getattr(where, name) for where, name in SELECTION}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def few_candidates() -> Iterator[None]:
+    """A fit chooses among few kernels and spreads, the usual ones included: all take most of the time of a small fit."""
+    with pytest.MonkeyPatch.context() as patch:
+        for (where, name), few in SELECTION.items():
+            patch.setattr(where, name, few)
+        yield
+
+
+@pytest.fixture
+def every_candidate(few_candidates: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As shipped, for tests of what is chosen."""
+    for (where, name), every in SHIPPED.items():
+        monkeypatch.setattr(where, name, every)
 
 
 @pytest.fixture(scope="session")

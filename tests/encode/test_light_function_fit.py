@@ -13,6 +13,7 @@ from srbf.encode.model_selection import TexelSample
 from srbf.light_domain import Directions
 from srbf.sphere import point_set, random_directions
 
+pytestmark = pytest.mark.usefixtures("every_candidate")
 BELOW_BEST = 1.5  # dB that the choice may lose against the best pair of the grid in hindsight; one choice a function lost 5 to 10
 
 
