@@ -53,6 +53,7 @@ def mapper(context: Any, closed_room: Any) -> Any:
         yield made
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", LIGHTS)
 def test_a_room_is_lit_as_by_rays(mapper: Any, closed_room: Any, kind: str) -> None:
     covered = closed_room.images["coverage"] > 0
@@ -64,6 +65,7 @@ def test_a_room_is_lit_as_by_rays(mapper: Any, closed_room: Any, kind: str) -> N
     assert (mapped[rays.max(axis=1) == 0] < 0.05 * peak).all()  # no light gets into shadows
 
 
+@pytest.mark.lengthy
 def test_lights_add_up_and_scale(mapper: Any) -> None:
     point, area = LIGHTS["point"], LIGHTS["area"]
     colored = PointLight(point.position, (2.0, 0.5, 0.0), falloff="inverse-square")  # type: ignore[union-attr]
@@ -73,6 +75,7 @@ def test_lights_add_up_and_scale(mapper: Any) -> None:
     )
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", ["point", "narrow spot", "wide spot", "spot with a size", "sphere", "area"])
 def test_nothing_shades_an_open_plane(context: Any, kind: str) -> None:
     receivers = build_plane(size=48, half=2.0, footprint=0.1)
@@ -95,6 +98,7 @@ def test_grazing_light_does_not_shade_its_plane(context: Any) -> None:
     assert (found[far] > 0.9 * expected[far]).all()
 
 
+@pytest.mark.lengthy
 def test_panes_multiply_by_their_transmittance(context: Any) -> None:
     pane = quad([-0.5, -0.5, 0.9], [0.5, -0.5, 0.9], [0.5, 0.5, 0.9], [-0.5, 0.5, 0.9])
     receivers = room(64, np.concatenate([pane, pane + np.array([0, 0, 0.1], np.float32)]), passed=0.5)
@@ -123,6 +127,7 @@ def test_a_ball_about_a_light_and_one_beside_it_have_no_stripes(context: Any, sm
     assert np.sqrt((error**2).mean()) < 0.005 * expected[covered].max() and np.abs(error).max() < 0.05 * expected[covered].max()
 
 
+@pytest.mark.lengthy
 def test_two_rooms_without_a_door_exchange_no_light(context: Any) -> None:
     wall = quad([0, -9, -1], [0, 9, -1], [0, 9, 9], [0, -9, 9])
     receivers = build_plane(wall, size=48)
