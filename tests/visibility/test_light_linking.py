@@ -51,7 +51,7 @@ def shown_by(way: str, receivers: Receivers) -> Iterator[Any]:
         yield RayTracer(receivers)
         return
     pytest.importorskip("moderngl")
-    with ShadowMapper(receivers) as mapper:
+    with ShadowMapper(receivers, size=256) as mapper:
         yield mapper
 
 
