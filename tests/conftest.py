@@ -33,6 +33,7 @@ if CHECKS_ANNOTATIONS:
     parts = [module.name for module in pkgutil.iter_modules([str(ROOT)])]
     annotation_checks.install([f"srbf.{part}" for part in parts if part not in ("cli", "__main__")])
 
+from forked_blender import loaded  # noqa: E402
 from made_assets import build_asset, build_planes  # noqa: E402
 from made_captures import write_capture  # noqa: E402
 
@@ -43,6 +44,7 @@ from srbf.export import loss  # noqa: E402
 from srbf.methods import relighting_map  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
+LONGEST = "docs/test_documented_commands.py"  # of the files, each of which one process of -n runs
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -51,7 +53,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what compiles other languages, or drives a browser: minutes in all; without bpy, skip what needs it."""
+    """Mark what compiles other languages, or drives a browser: minutes in all; without bpy, skip what needs it. The longest file first."""
     here = Path(__file__).parent
     lacks_blender = importlib.util.find_spec("bpy") is None
     for item in items:
@@ -59,6 +61,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason="this Python has no bpy"))
         if item.path.is_relative_to(here) and item.path.relative_to(here).as_posix().startswith(OTHER_LANGUAGES):
             item.add_marker(pytest.mark.engines)
+    items.sort(key=lambda item: item.path != here / LONGEST)
 
 
 STARTED = pytest.StashKey[float]()
@@ -128,6 +131,15 @@ def every_candidate(few_candidates: None, monkeypatch: pytest.MonkeyPatch) -> No
     """As shipped, for tests of what is chosen."""
     for (where, name), every in SHIPPED.items():
         monkeypatch.setattr(where, name, every)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_loaded_blender() -> Iterator[None]:
+    """Workers of bakes that run in the test's process are forked from one that has loaded Blender once."""
+    with pytest.MonkeyPatch.context() as patch:
+        if sys.platform == "linux":  # other systems' libraries do not survive a fork
+            patch.setattr("srbf.bake.worker.subprocess", loaded())
+        yield
 
 
 @pytest.fixture(scope="session")
