@@ -46,7 +46,7 @@ test: setup-test
 	$(BIN)/pytest -m "not ($(FAST))" -n 4 --dist loadfile --no-loadscope-reorder
 
 test-fast: setup-test
-	$(BIN)/pytest -m "$(FAST)" -n 2 --dist worksteal
+	$(BIN)/pytest -m "$(FAST) and not lengthy" -n 2 --dist worksteal
 
 test-godot: setup-test
 	sh scripts/godot-chroot

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from types import FunctionType
-from typing import Any
+from dataclasses import is_dataclass
+from types import FunctionType, SimpleNamespace
+from typing import Any, get_type_hints
 from unittest import mock
 
 import jaxtyping
 from beartype import BeartypeConf, beartype
 
 CALLS = 16  # of each function that a test checks
-check = beartype(conf=BeartypeConf(is_pep484_tower=True))
+check = beartype(conf=BeartypeConf(is_pep484_tower=True, violation_type=TypeError))
 whole = jaxtyping.jaxtyped
 tests = 0  # begun
 
@@ -32,10 +33,25 @@ def next_test() -> None:
     tests += 1
 
 
+def resolved(function: FunctionType) -> FunctionType:
+    """The function, its annotations no longer text; Any where one is for readers or type checkers alone."""
+    for name, text in function.__annotations__.items():
+        alone = SimpleNamespace(__annotations__={name: text}, __globals__=function.__globals__)
+        try:
+            function.__annotations__[name] = get_type_hints(alone, function.__globals__, include_extras=True)[name]
+        except (NameError, AttributeError):  # of names that are not imported, of `...` for any shape
+            function.__annotations__[name] = Any
+    return function
+
+
 def first_calls(what: Any = None, *, typechecker: Any = None) -> Any:
-    """In place of jaxtyping's decorator."""
+    """In place of jaxtyping's decorator: one wrapper of beartype for arguments and result, not two."""
     if what is None:
         return first_calls
+    if isinstance(what, type):
+        if is_dataclass(what):
+            what.__init__ = first_calls(what.__init__)  # type: ignore[method-assign]
+        return what
     if not isinstance(what, FunctionType):
         return whole(what, typechecker=check)
     checked: Callable[..., Any] | None = None
@@ -49,7 +65,8 @@ def first_calls(what: Any = None, *, typechecker: Any = None) -> Any:
         if calls == CALLS:
             return what(*given, **named)
         calls += 1
-        checked = checked or whole(what, typechecker=check)
-        return checked(*given, **named)
+        checked = checked or check(resolved(what))
+        with whole("context"):  # in which names of sizes are bound
+            return checked(*given, **named)
 
     return checks_some

@@ -8,6 +8,7 @@ import pkgutil
 import signal
 import sys
 from collections.abc import Callable, Generator, Iterator
+from functools import partial
 from pathlib import Path
 
 # Before numpy loads: one thread per test process for BLAS, OpenMP and Mesa's software renderer, or the processes of -n wait for each other.
@@ -32,15 +33,18 @@ if CHECKS_ANNOTATIONS:
     parts = [module.name for module in pkgutil.iter_modules([str(ROOT)])]
     annotation_checks.install([f"srbf.{part}" for part in parts if part not in ("cli", "__main__")])
 
+from forked_blender import loaded  # noqa: E402
 from made_assets import build_asset, build_planes  # noqa: E402
 from made_captures import write_capture  # noqa: E402
 
 from srbf.asset import Asset  # noqa: E402
 from srbf.capture import Capture  # noqa: E402
-from srbf.encode import position_table  # noqa: E402
+from srbf.encode import light_function_fit, model_selection, position_table  # noqa: E402
 from srbf.export import loss  # noqa: E402
+from srbf.methods import relighting_map  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
+LONGEST = "docs/test_documented_commands.py"  # of the files, each of which one process of -n runs
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -49,7 +53,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what compiles other languages, or drives a browser: minutes in all; without bpy, skip what needs it."""
+    """Mark what compiles other languages, or drives a browser: minutes in all; without bpy, skip what needs it. The longest file first."""
     here = Path(__file__).parent
     lacks_blender = importlib.util.find_spec("bpy") is None
     for item in items:
@@ -57,6 +61,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason="this Python has no bpy"))
         if item.path.is_relative_to(here) and item.path.relative_to(here).as_posix().startswith(OTHER_LANGUAGES):
             item.add_marker(pytest.mark.engines)
+    items.sort(key=lambda item: item.path != here / LONGEST)
 
 
 STARTED = pytest.StashKey[float]()
@@ -99,6 +104,41 @@ def coarse_tables_of_places_and_losses() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(position_table, "MOST_NODES", 128)
         patch.setattr(loss, "LIGHTS", 12)
+        yield
+
+
+SELECTION: dict[tuple[object, str], object] = {
+    (light_function_fit, "SPREADS"): (0.7, 1.42, 2.0),
+    (light_function_fit, "NARROW"): (0.7,),
+    (light_function_fit, "WIDE"): (2.0,),
+    (light_function_fit, "WIDE_SHARES"): (0.99,),
+    (relighting_map, "spread_candidates"): partial(model_selection.spread_candidates, factors=model_selection.SPREADS[::4]),
+}
+SHIPPED = {(where, name): getattr(where, name) for where, name in SELECTION}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def few_candidates() -> Iterator[None]:
+    """A fit chooses among few kernels and spreads, the usual ones included: all take most of the time of a small fit."""
+    with pytest.MonkeyPatch.context() as patch:
+        for (where, name), few in SELECTION.items():
+            patch.setattr(where, name, few)
+        yield
+
+
+@pytest.fixture
+def every_candidate(few_candidates: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As shipped, for tests of what is chosen."""
+    for (where, name), every in SHIPPED.items():
+        monkeypatch.setattr(where, name, every)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_loaded_blender() -> Iterator[None]:
+    """Workers of bakes that run in the test's process are forked from one that has loaded Blender once."""
+    with pytest.MonkeyPatch.context() as patch:
+        if sys.platform == "linux":  # other systems' libraries do not survive a fork
+            patch.setattr("srbf.bake.worker.subprocess", loaded())
         yield
 
 

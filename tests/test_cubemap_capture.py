@@ -163,6 +163,7 @@ def test_a_fit_within_a_budget_keeps_to_it_and_relights(capture: Capture, tmp_pa
     np.testing.assert_array_equal(linear_response(Asset.open(tmp_path / "asset"), [DirectionalLight((x, y, z))]), relit)
 
 
+@pytest.mark.lengthy
 def test_without_bounces_there_is_direct_light_alone(tmp_path: Path) -> None:
     """As in a convex scene, or where nothing reflects."""
     capture = made(tmp_path / "capture", rank=0)

@@ -34,6 +34,7 @@ def test_the_shares_of_a_step_are_all_texels_once(width: int, height: int, step:
     assert (times == 1).all()
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("count", [400, 1536])
 @pytest.mark.parametrize("step", [2, 3])
 def test_neighbors_in_direction_have_other_shares(count: int, step: int) -> None:
@@ -77,6 +78,7 @@ def parted(folder: Path, step: int = 2) -> Capture:
     return Capture.open(folder)
 
 
+@pytest.mark.lengthy
 def test_a_share_is_read_as_a_whole_image(tmp_path: Path) -> None:
     whole, capture = whole_images(tmp_path / "whole"), parted(tmp_path / "parted")
     for i in range(len(capture.lights)):
@@ -100,6 +102,7 @@ def test_a_share_is_read_as_a_whole_image(tmp_path: Path) -> None:
     np.testing.assert_array_equal(capture.load(texels).image(3)[0], capture.image(3).reshape(-1, 3)[texels])
 
 
+@pytest.mark.lengthy
 def test_a_capture_of_shares_is_fitted(tmp_path: Path) -> None:
     whole = whole_images(tmp_path / "whole")
     method = EigenMap(components=3)

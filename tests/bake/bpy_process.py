@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from forked_blender import loaded
 
 ROOT = Path(__file__).parents[2]
 
@@ -24,13 +25,20 @@ def in_blender(function: Callable[..., dict[str, Any]], *arguments: Any) -> dict
     """What `function` of a test module returns, by name, called with JSON `arguments` in a new process."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.npz"
-        command = [sys.executable, __file__, function.__code__.co_filename, function.__name__, json.dumps(arguments), str(out)]
         ours = [folder for folder in sys.path if Path(folder).is_relative_to(ROOT) and "site-packages" not in folder]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(ours)}  # what the test's module finds, it finds here
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
+        found = {"PYTHONPATH": os.pathsep.join(ours)}  # what the test's module finds, it finds here
+        done = run(Path(__file__), function.__code__.co_filename, function.__name__, json.dumps(arguments), out, **found)
         assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
         with np.load(out) as arrays:
             return dict(arrays)
+
+
+def run(script: Path, *arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    """`python SCRIPT ARGUMENTS` where Blender, pytest and srbf are loaded already."""
+    if sys.platform == "linux":
+        return loaded("pytest", "srbf.bake.run").run(script, *arguments, **environment)
+    command = [sys.executable, str(script), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, **environment})
 
 
 def main(file: str, function: str, arguments: str, out: str) -> None:

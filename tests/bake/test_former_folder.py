@@ -50,6 +50,7 @@ def as_before(folder: Path) -> None:
     (folder / "accumulation").replace(folder / FORMER)
 
 
+@pytest.mark.lengthy
 def test_a_former_bake_is_resumed_without_preparing_it_again(bake: Bake, tmp_path: Path) -> None:
     whole = replace(bake, folder=tmp_path / "whole")
     assert whole.run(Reporter())
@@ -97,6 +98,7 @@ def test_adopting_a_folder_may_be_killed_at_any_step(bake: Bake, steps: int, mon
     assert found == expected
 
 
+@pytest.mark.lengthy
 def test_a_shard_adopts_what_is_prepared(bake: Bake, tmp_path: Path) -> None:
     assert bake.run(Reporter(), shard=Shard(0, 0))
     as_before(bake.folder)
@@ -108,6 +110,7 @@ def test_a_shard_adopts_what_is_prepared(bake: Bake, tmp_path: Path) -> None:
     assert contents(bake.folder) == contents(whole.folder)
 
 
+@pytest.mark.lengthy
 def test_a_damaged_record_is_prepared_again(bake: Bake, tmp_path: Path) -> None:
     assert bake.run(Reporter())
     expected = contents(bake.folder)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from bpy_process import run as run_script
 from conftest import SCENES, Baked, built
 from typer.testing import CliRunner
 
@@ -56,8 +55,7 @@ def run(*words: object) -> tuple[int, str]:
 def test_any_mode_is_left_and_its_edits_kept(tmp_path: Path, mode: str, whose: str) -> None:
     """The lid's shadow is a square half as wide as the plane, beneath it: where the edit, or the pose, has moved it."""
     scene = tmp_path / "scene.blend"
-    line = [sys.executable, str(SCENES / "odd_files.py"), "mode", mode, whose, str(scene)]
-    subprocess.run(line, check=True, capture_output=True, timeout=120)
+    run_script(SCENES / "odd_files.py", "mode", mode, whose, scene).check_returncode()
     capture = bake(scene, tmp_path / "capture", "lightmap:Plane").capture
     position, image = capture.geometry("position"), capture.image(0)[..., 0]
     plane_moved = mode == "EDIT_BOTH" or (mode == "EDIT" and whose == "receiver")

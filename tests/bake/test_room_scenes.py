@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from bpy_process import run
 from building import SCENES
 
 pytestmark = pytest.mark.blender
@@ -17,11 +16,10 @@ pytestmark = pytest.mark.blender
 def facts(tmp_path: Path, script: str, box: tuple[str, str], *options: str) -> dict[str, Any]:
     """Of the scene that a script builds, see room_in_blender.py."""
     blend = tmp_path / "scene.blend"
-    command = [sys.executable, str(SCENES / f"{script}.py"), str(blend), *options]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
-    child = [sys.executable, str(Path(__file__).with_name("room_in_blender.py")), str(blend), *box]
-    run = subprocess.run(child, check=True, capture_output=True, text=True, timeout=120)
-    return json.loads(next(line for line in run.stdout.splitlines() if line.startswith("{")))
+    run(SCENES / f"{script}.py", blend, *options).check_returncode()
+    done = run(Path(__file__).with_name("room_in_blender.py"), blend, *box)
+    done.check_returncode()
+    return json.loads(next(line for line in done.stdout.splitlines() if line.startswith("{")))
 
 
 CLOSED = {

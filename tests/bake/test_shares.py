@@ -54,6 +54,7 @@ class StopError(Exception):
     pass
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("transport", ["combined", "indirect"])
 @pytest.mark.skipif(sys.platform == "win32", reason="runs a script as Blender")
 def test_a_stopped_bake_goes_on_to_the_same_bits(tmp_path: Path, transport: Transport) -> None:

@@ -150,6 +150,7 @@ def test_a_view_from_inside_an_object_is_said() -> None:
     assert len(said) == 1
 
 
+@pytest.mark.lengthy
 def test_receivers_that_see_nothing_are_said_and_refused_when_they_are_all(tmp_path) -> None:
     """As where their normals point out of a room."""
     capture = room_of_surfels(tmp_path / "capture", BOX, 100, tested=1)

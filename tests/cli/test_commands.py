@@ -65,6 +65,7 @@ def asset(made: Path, tmp_path: Path) -> Path:
     return shutil.copytree(made / "asset", tmp_path / "asset")
 
 
+@pytest.mark.lengthy
 def test_fit_evaluate_and_info(capture: Capture, asset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened = Asset.open(asset)
     assert opened.k == 9 and set(opened.manifest["error"]) == {"train", "holdout"}
@@ -231,6 +232,7 @@ def test_outputs_that_exist_are_refused_unless_forced(asset: Path, capture: Capt
     ok("relight", asset, "-o", tmp_path / "a.exr", "--ambient-only", "--force")
 
 
+@pytest.mark.lengthy
 def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tmp_path: Path) -> None:
     out = tmp_path / "new"
     assert "capture.json" in refused("fit", tmp_path, "-o", out)
@@ -381,6 +383,7 @@ def test_the_library_needs_numpy_and_scipy_alone() -> None:
     assert int(done.stdout) > 30
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize(
     "flags",
     [

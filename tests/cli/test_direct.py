@@ -56,6 +56,7 @@ def asset(made: Path, tmp_path: Path) -> Path:
     return shutil.copytree(made / "asset", tmp_path / "asset")
 
 
+@pytest.mark.lengthy
 def test_an_indirect_asset_carries_its_scene(capture: Capture, asset: Path) -> None:
     opened = Asset.open(asset)
     assert opened.transport == "indirect" and opened.scene == capture.scene()
@@ -106,6 +107,7 @@ PLACED = {
 }
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", PLACED)
 def test_lights_inside_the_scene_light_it_by_rays_and_by_shadow_maps(asset: Path, tmp_path: Path, kind: str) -> None:
     found = {}
@@ -174,6 +176,7 @@ def test_evaluate_compares_with_what_was_asked_for(asset: Path, capture: Capture
     assert "--direct ray" in refused("evaluate", asset, whole.folder)
 
 
+@pytest.mark.lengthy
 def test_a_combined_asset_takes_no_direct_light(capture: Capture, make_capture, tmp_path: Path) -> None:
     whole = make_capture(lambda d: np.full((10, 14, 3), d[2]), name="combined")
     ok("fit", whole.folder, "-o", tmp_path / "combined asset", "-k", 9)

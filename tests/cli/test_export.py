@@ -28,6 +28,7 @@ def asset(make_capture, plane_positions, tmp_path: Path) -> Path:
     return tmp_path / "asset"
 
 
+@pytest.mark.lengthy
 def test_it_says_what_is_lost_and_what_it_costs(asset: Path, tmp_path: Path) -> None:
     done = srbf("export", asset, "-o", tmp_path / "out", "--target", "dds")
     assert done.exit_code == 0 and done.stdout == "", done.stderr
@@ -48,6 +49,7 @@ def test_json_alone_on_stdout(asset: Path, tmp_path: Path) -> None:
     assert told["layer_bytes"] == Asset.open(tmp_path / "out").layer_bytes() and told["psnr"] > 0
 
 
+@pytest.mark.lengthy
 def test_fewer_maps_first(asset: Path, tmp_path: Path) -> None:
     done = srbf("export", asset, "-o", tmp_path / "out", "--target", "png", "--reduce-to", 5)
     assert done.exit_code == 0 and "kept 5 of 9" in done.stderr

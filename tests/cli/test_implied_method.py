@@ -57,6 +57,7 @@ def test_bytes_or_decibels_alone_choose(capture: Capture, tmp_path: Path, flags:
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
 
 
+@pytest.mark.lengthy
 def test_leaving_one_out_takes_the_same_method(make_capture) -> None:
     folder = make_capture(lambda d: np.full((2, 3, 3), max(0, d[2])), holdout=2, directions=fibonacci(24)[:12]).folder
     assert srbf("evaluate", "--leave-one-out", folder, "--components", 2).exit_code == 0

@@ -55,6 +55,7 @@ def view(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "asset"
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("renderer", ["numpy", "gl"])
 def test_over_any_background_edges_are_the_mixture_by_coverage(view: Path, tmp_path: Path, renderer: str) -> None:
     share, asset = disc()[..., None], Asset.open(view)

@@ -49,11 +49,13 @@ def test_the_list_of_commands_imports_no_command_and_no_library(flag: str) -> No
     }  # fmt: skip
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_imports_numpy_at_most(command: str) -> None:
     assert not imported(command, "--help") & set(LIBRARIES[1:])
 
 
+@pytest.mark.lengthy
 def test_fit_and_info_leave_out_what_they_do_not_need(make_capture, tmp_path: Path) -> None:
     capture = make_capture(lambda d: np.full((4, 5, 3), max(0, d[2])), lights=8)
     modules = imported("fit", capture.folder, "-o", tmp_path / "asset", "-k", 4)

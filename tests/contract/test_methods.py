@@ -146,6 +146,7 @@ def test_a_moved_asset_is_lit_where_it_stands(asymmetric: Asset) -> None:
     np.testing.assert_allclose(linear_response(instance, moved), here, atol=FLOAT32 * np.abs(here).max() * 10)
 
 
+@pytest.mark.lengthy
 def test_permuting_receivers_permutes_the_picture(make_capture, method) -> None:
     if isinstance(method, ClusteredEigenMap):
         method = replace(method, clusters=1)  # where clusters start depends on the order of the texels

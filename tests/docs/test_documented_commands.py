@@ -95,6 +95,7 @@ def test_somebody_runs_it(commands: tuple[Command, ...]) -> None:
                 assert (wrong := wrong_in(step)) is None, f"{command}\n  in {step.text}: {wrong}"
 
 
+@pytest.mark.lengthy
 def test_flags_that_are_named_exist() -> None:
     unknown = [str(flag) for page in PAGES for flag in page.flags if not fits_some_command(flag)]
     assert not unknown, "no command and no script of ours takes:\n" + "\n".join(unknown)

@@ -88,6 +88,7 @@ def test_all_ways_to_read_an_image_agree(noisy: Capture) -> None:
     np.testing.assert_array_equal(of_some.image(1), clean.image(2))
 
 
+@pytest.mark.lengthy
 def test_the_order_of_texels_does_not_matter(make_capture: Make) -> None:
     order = np.random.default_rng(2).permutation(SIDE * SIDE)
     first = train_images(clean_of(floor_capture(make_capture, NOISE, name="first")))

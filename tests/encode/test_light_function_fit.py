@@ -13,15 +13,18 @@ from srbf.encode.model_selection import TexelSample
 from srbf.light_domain import Directions
 from srbf.sphere import point_set, random_directions
 
+pytestmark = pytest.mark.usefixtures("every_candidate")
 BELOW_BEST = 1.5  # dB that the choice may lose against the best pair of the grid in hindsight; one choice a function lost 5 to 10
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("case", [case for case in boards(texels=200) if "four" in case.name], ids=lambda case: case.name)
 def test_no_pair_of_a_grid_is_much_better(case: Case) -> None:
     chosen, best = light_functions(case)
     assert chosen >= best - BELOW_BEST
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("case", [case for case in boards(texels=200) if "four" in case.name], ids=lambda case: case.name)
 def test_light_functions_are_no_worse_than_35_maps(case: Case) -> None:
     assert light_functions(case)[0] >= maps(case, 35)[0]

@@ -31,6 +31,7 @@ def noisy(height: int, width: int):
     return lambda direction: (rng.random((height, width, 3)) * (1 + direction[2])).astype(np.float16)
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize(("height", "width", "threads", "exact"), [(512, 128, 1, True), (100, 77, 2, False)])
 def test_tiles_give_the_fit_of_the_whole(make_capture, height: int, width: int, threads: int, exact: bool) -> None:
     capture = make_capture(noisy(height, width), lights=30, holdout=0, encoding="half")

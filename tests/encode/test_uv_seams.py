@@ -153,6 +153,7 @@ def test_clusters_agree_as_well_as_they_hold_the_images(cut: Capture, encoding: 
     assert after**2 <= before**2 + (0.05 * seams["before"] * mean) ** 2
 
 
+@pytest.mark.lengthy
 def test_the_command_says_what_it_stitched(cut: Capture, tmp_path) -> None:
     flags = ["-k", "9", "--spread", "mean", "--ridge", "0.1"]
     done = CliRunner().invoke(app, ["fit", str(cut.folder), "-o", str(tmp_path / "a"), *flags])

@@ -64,6 +64,7 @@ def test_error_at_the_border_alone(capture: Capture, monkeypatch: pytest.MonkeyP
     assert found.jump_at_border == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.lengthy
 def test_a_clustered_asset_is_measured_at_its_own_borders(make_capture) -> None:
     """Two materials: an exact fit of each has neither error nor jump, though the picture changes at the border."""
     albedo = np.where(HALVES[..., None] == 0, [0.8, 0.2, 0.1], [0.1, 0.3, 0.9])

@@ -26,6 +26,7 @@ def capture(make_capture, request: pytest.FixtureRequest) -> Capture:
     return make_capture(response, lights=40, encoding=request.param, coverage=covered.astype(np.float32))
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("encoding", ["half", "uint8"])
 def test_watched_errors_are_those_of_a_second_reading(capture: Capture, encoding: str) -> None:
     watch = TrainErrorAccumulator(capture)
@@ -37,6 +38,7 @@ def test_watched_errors_are_those_of_a_second_reading(capture: Capture, encoding
         assert one == {**other, **{key: pytest.approx(other[key], rel=ROUNDING) for key in ("rmse", "relative_rmse")}}
 
 
+@pytest.mark.lengthy
 def test_a_sample_of_texels_comes_near(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("srbf.evaluation.errors_by_role.MEMORY_BYTES", 6 * 40 * 900)
     watch = TrainErrorAccumulator(capture)

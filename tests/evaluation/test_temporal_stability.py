@@ -137,6 +137,7 @@ def test_twenty_five_gaussians_of_the_hemisphere_pulse_and_those_of_the_sphere_h
     assert around.largest_flicker < 0.01
 
 
+@pytest.mark.lengthy
 def test_a_sweep_is_the_relit_picture(make_capture, plane_positions: np.ndarray) -> None:
     waves = np.random.default_rng(0).normal(size=(10, 14, 3, 3))
     coverage = np.ones((10, 14), np.float32)
@@ -157,6 +158,7 @@ def test_a_sweep_is_the_relit_picture(make_capture, plane_positions: np.ndarray)
     np.testing.assert_array_equal(document["flicker"], motion.flicker)
 
 
+@pytest.mark.lengthy
 def test_a_dense_reference_is_the_truth_where_lights_are_dense(make_capture) -> None:
     waves = np.random.default_rng(1).normal(size=(4, 5, 3, 3))
     capture = make_capture(lambda d: 1.5 + np.sin(waves @ d), lights=300, holdout=20)
@@ -167,6 +169,7 @@ def test_a_dense_reference_is_the_truth_where_lights_are_dense(make_capture) -> 
     np.testing.assert_allclose(dense_reference(capture, texels)(capture.directions(inside)), expected, atol=0.05)
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize(("domain", "tolerance"), [("hemisphere", 0.015), ("sphere", 0.025)])
 def test_a_dense_reference_keeps_a_lambert_planes_brightness(make_capture, domain: str, tolerance: float) -> None:
     capture = make_capture(lambda d: np.full((1, 2, 3), max(0, d[2])), lights=400, domain=domain)

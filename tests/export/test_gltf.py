@@ -119,6 +119,7 @@ def made_glb(path: Path, uv_sets: int, name: str = "Bowl") -> None:
     path.write_bytes(document.pack())
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("uv_sets", [1, 2])
 def test_a_mesh_that_is_given(make_asset: Callable[..., Asset], tmp_path: Path, uv_sets: int) -> None:
     """Its last UV set of two is the lightmap's, its only one too; other objects keep what they have."""

@@ -111,6 +111,7 @@ def probes() -> Asset:
     return replace(base, manifest=base.manifest | {"receiver": grid.described()}, probes=grid)
 
 
+@pytest.mark.lengthy
 def test_probes_go_along_and_come_back(tmp_path: Path) -> None:
     asset = probes()
     write(asset, tmp_path / "project")

@@ -61,6 +61,7 @@ def slow_mean(picture: np.ndarray, coverage: np.ndarray, level: int) -> tuple[np
     return mean / np.maximum(area, 1e-30)[..., None], area
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("method", ["maps", "planes"])
 def test_a_level_relit_is_the_picture_filtered(method: str, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset]) -> None:
     asset = charts(make_asset if method == "maps" else make_planes)

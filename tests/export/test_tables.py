@@ -50,6 +50,7 @@ def test_a_target_opens_again_as_the_asset(kind: str, target: str, tmp_path: Pat
     assert again.psnr > 50 and (tmp_path / "again" / "asset.json").is_file()
 
 
+@pytest.mark.lengthy
 @pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")
 @pytest.mark.parametrize("kind", KINDS)
 def test_metal_has_one_stage_for_all_lights(kind: str, tmp_path: Path) -> None:
@@ -58,6 +59,7 @@ def test_metal_has_one_stage_for_all_lights(kind: str, tmp_path: Path) -> None:
     assert len(texts) == 3 and sum("texture2d_array<float>" in text for text in texts) == 1
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_shader_takes_weights_alone(kind: str, tmp_path: Path) -> None:
     asset = made(kind)
@@ -68,6 +70,7 @@ def test_the_shader_takes_weights_alone(kind: str, tmp_path: Path) -> None:
         assert "srbfAssetDirectional" in text and "srbfFinish" in text and "srbfAssetLights" not in text and "SrbfPointLights" not in text
 
 
+@pytest.mark.lengthy
 def test_a_fitted_cloud_keeps_its_tables(tmp_path: Path) -> None:
     capture = room_of_patches(tmp_path / "capture", Room.box((2, 1.5, 1.2), 0.4), 8, tested=2)
     asset = LightCloud(clusters=2, components=3).encode(capture)

@@ -93,6 +93,7 @@ def test_bytes_are_those_of_the_file(make_asset: Callable[..., Asset], tmp_path:
     assert report.resident_bytes - one.resident_bytes == report.layer_bytes - one.layer_bytes
 
 
+@pytest.mark.lengthy
 def test_a_loss_past_the_bound_is_refused_and_leaves_nothing(make_asset: Callable[..., Asset], tmp_path: Path) -> None:
     asset = make_asset()
     found = export(asset, "dds", tmp_path / "out").psnr

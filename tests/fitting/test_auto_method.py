@@ -79,6 +79,7 @@ def test_a_lower_target_takes_fewer_bytes(shadows: Capture, monkeypatch: pytest.
     assert "expected 90 dB" in said[-2] and said[-1].startswith("chose")
 
 
+@pytest.mark.lengthy
 def test_a_relative_error_takes_bytes_that_reach_it(cosines: Capture) -> None:
     said: list[str] = []
     settings = {"spread": 0.3, "ridge": 0.01}

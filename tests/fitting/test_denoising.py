@@ -53,6 +53,7 @@ def test_a_noisy_lightmap_gains_and_says_so(make_capture: Make) -> None:
     assert same(auto, fitted(capture, "on", said)) and same(off, METHOD.encode(capture))
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("grain", [0.0, 0.3], ids=["smooth", "grain that is true"])
 def test_a_lightmap_without_noise_is_left_as_it_is(make_capture: Make, grain: float) -> None:
     capture, said = floor_capture(make_capture, 0.0, grain=grain), list[str]()
@@ -61,6 +62,7 @@ def test_a_lightmap_without_noise_is_left_as_it_is(make_capture: Make, grain: fl
     assert same(auto, fitted(capture, "off", said)) and len(said) == 1
 
 
+@pytest.mark.lengthy
 def test_captures_that_it_is_not_for_are_left_alone(make_capture: Make) -> None:
     capture, said = floor_capture(make_capture, 0.4), list[str]()
     view = replace(capture, manifest={**capture.manifest, "receiver": {"kind": "view", "camera": "Camera"}})

@@ -23,6 +23,7 @@ def dropped(asset, count: int) -> np.ndarray:
     return np.tensordot(asset.basis.evaluate(all_around("hemisphere", 300))[:, :count], asset.coefficients()[:count], 1)
 
 
+@pytest.mark.lengthy
 def test_projection_keeps_the_picture_where_dropping_does_not(make_capture) -> None:
     asset = RelightingMap(k=25, encoding="float").encode(make_capture(smooth, lights=80))
     kept = keep(asset, 12)
@@ -34,6 +35,7 @@ def test_projection_keeps_the_picture_where_dropping_does_not(make_capture) -> N
     assert kept.manifest["source"]["kept"]["relative_residual"] == pytest.approx(change / np.sqrt((before**2).mean()), rel=0.2)
 
 
+@pytest.mark.lengthy
 def test_keeping_fewer_loses_more(make_capture) -> None:
     asset = RelightingMap(k=25).encode(make_capture(smooth, lights=80))
     lost = [keep(asset, count).manifest["source"]["kept"]["relative_residual"] for count in (20, 9, 4, 1)]
@@ -51,6 +53,7 @@ def test_an_eigen_map_drops_its_last_planes(make_capture, tmp_path) -> None:
     np.testing.assert_allclose(responses(opened, directions), responses(fewer, directions), atol=1e-4)
 
 
+@pytest.mark.lengthy
 def test_what_cannot_be_kept_is_refused(make_capture) -> None:
     capture = make_capture(smooth, lights=80)
     asset = RelightingMap(k=4).encode(capture)

@@ -110,6 +110,7 @@ def by_rays(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return bool(PoolPasses.shadow_rays)
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", ["point", "spot", "near a wall", "sphere"])
 def test_walls_shade_surfels_as_rays_say(divided: Asset, context: Any, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(PoolPasses, "shadow_rays", False)
@@ -137,6 +138,7 @@ def test_by_rays_it_is_numpy_s_picture_at_every_pixel(divided: Asset, context: A
         np.testing.assert_allclose(relighter.relight([light]), expected, atol=BOUNCES * expected.max())
 
 
+@pytest.mark.lengthy
 def test_bright_surfels_light_as_in_numpy(context: Any, tmp_path: Path, by_rays: bool) -> None:
     """A light 3 cm off a wall of many surfels, behind a wall with a door, with lobes: less than all is seen of the bright ones."""
     room = Room.box((3, 2, 2), 0.25, 0.6, wall=(1.5, 0.6, 1.4), lid=False)

@@ -41,6 +41,7 @@ def lit(request, tmp_path_factory) -> tuple[Asset, list[Light]]:
     return method.encode(capture), MIX
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("multipass", [False, True])
 def test_shaders_show_what_numpy_does(lit: tuple[Asset, list[Light]], multipass: bool) -> None:
     asset, lights = lit

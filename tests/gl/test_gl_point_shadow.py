@@ -17,6 +17,7 @@ from srbf.unshadowed import irradiance_from
 from srbf.visibility.rays import RayTracer
 from srbf.visibility.shadow_map import ShadowMapper
 
+SIDE = 1024  # texels per side of maps, half of what ships: the bars below hold, and the software renderer takes half the time
 PSNR = 45.0  # dB of the room's light, its peak the 99.9 % quantile; 50 to 65 measured
 LIGHTS: dict[str, Light] = {
     "point": PointLight((0.1, -0.1, 1.6), falloff="inverse-square"),
@@ -49,10 +50,11 @@ def closed_room() -> Any:
 
 @pytest.fixture(scope="module")
 def mapper(context: Any, closed_room: Any) -> Any:
-    with ShadowMapper(closed_room, context=context) as made:
+    with ShadowMapper(closed_room, size=SIDE, context=context) as made:
         yield made
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", LIGHTS)
 def test_a_room_is_lit_as_by_rays(mapper: Any, closed_room: Any, kind: str) -> None:
     covered = closed_room.images["coverage"] > 0
@@ -64,6 +66,7 @@ def test_a_room_is_lit_as_by_rays(mapper: Any, closed_room: Any, kind: str) -> N
     assert (mapped[rays.max(axis=1) == 0] < 0.05 * peak).all()  # no light gets into shadows
 
 
+@pytest.mark.lengthy
 def test_lights_add_up_and_scale(mapper: Any) -> None:
     point, area = LIGHTS["point"], LIGHTS["area"]
     colored = PointLight(point.position, (2.0, 0.5, 0.0), falloff="inverse-square")  # type: ignore[union-attr]
@@ -73,13 +76,14 @@ def test_lights_add_up_and_scale(mapper: Any) -> None:
     )
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", ["point", "narrow spot", "wide spot", "spot with a size", "sphere", "area"])
 def test_nothing_shades_an_open_plane(context: Any, kind: str) -> None:
     receivers = build_plane(size=48, half=2.0, footprint=0.1)
     light = LIGHTS[kind]
     place, normal = (receivers.images[name].reshape(-1, 3) for name in ("position", "normal"))
     expected = irradiance_from(light, place, normal)
-    with ShadowMapper(receivers, context=context) as mapper:
+    with ShadowMapper(receivers, size=SIDE, context=context) as mapper:
         found = mapper.response([light])[..., 0].ravel()
     np.testing.assert_allclose(found, expected, rtol=2e-3, atol=2e-3 * expected.max())
 
@@ -89,18 +93,19 @@ def test_grazing_light_does_not_shade_its_plane(context: Any) -> None:
     light = PointLight((-0.9, 0.0, 0.02))
     place, normal = (receivers.images[name].reshape(-1, 3) for name in ("position", "normal"))
     expected = irradiance_from(light, place, normal).reshape(48, 48)
-    with ShadowMapper(receivers, context=context) as mapper:
+    with ShadowMapper(receivers, size=SIDE, context=context) as mapper:
         found = mapper.response([light])[..., 0]
     far = np.abs(receivers.images["position"][..., 0] + 0.9) > 0.2
     assert (found[far] > 0.9 * expected[far]).all()
 
 
+@pytest.mark.lengthy
 def test_panes_multiply_by_their_transmittance(context: Any) -> None:
     pane = quad([-0.5, -0.5, 0.9], [0.5, -0.5, 0.9], [0.5, 0.5, 0.9], [-0.5, 0.5, 0.9])
     receivers = room(64, np.concatenate([pane, pane + np.array([0, 0, 0.1], np.float32)]), passed=0.5)
     covered = receivers.images["coverage"] > 0
     rays = RayTracer(receivers)
-    with ShadowMapper(receivers, context=context) as mapper:
+    with ShadowMapper(receivers, size=SIDE, context=context) as mapper:
         for light in (LIGHTS["point"], LIGHTS["area"]):
             expected, found = rays.response([light])[covered], mapper.response([light])[covered]
             peak = np.quantile(expected, 0.999)
@@ -118,16 +123,17 @@ def test_a_ball_about_a_light_and_one_beside_it_have_no_stripes(context: Any, sm
     normal = made.receivers.images["normal"] if smooth else made.face
     light = PointLight((2.0, 1.0, 1.5), falloff="inverse-square", a0=2.0)
     expected = irradiance_from(light, made.receivers.images["position"].reshape(-1, 3), normal.reshape(-1, 3)).reshape(covered.shape)
-    with ShadowMapper(made.receivers, context=context) as mapper:
+    with ShadowMapper(made.receivers, size=SIDE, context=context) as mapper:
         error = (mapper.response([light])[..., 0] - expected)[covered]
     assert np.sqrt((error**2).mean()) < 0.005 * expected[covered].max() and np.abs(error).max() < 0.05 * expected[covered].max()
 
 
+@pytest.mark.lengthy
 def test_two_rooms_without_a_door_exchange_no_light(context: Any) -> None:
     wall = quad([0, -9, -1], [0, 9, -1], [0, 9, 9], [0, -9, 9])
     receivers = build_plane(wall, size=48)
     beyond = receivers.images["position"][..., 0] < -0.05
-    with ShadowMapper(receivers, context=context) as mapper:
+    with ShadowMapper(receivers, size=SIDE, context=context) as mapper:
         for light in (
             PointLight((0.3, 0, 0.5)),
             SphereLight((0.3, 0, 0.5), size=0.2),

@@ -29,6 +29,7 @@ def scene() -> Any:
     )
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("number", range(4))
 def test_it_equals_rays_away_from_edges(context: Any, scene: Any, number: int) -> None:
     direction = random_directions(4, "hemisphere", np.random.default_rng(5))[number]
@@ -52,6 +53,7 @@ def test_an_open_plane_never_shades_itself(context: Any) -> None:
             np.testing.assert_allclose(mapper.response([light]), expected, rtol=NEAR)
 
 
+@pytest.mark.lengthy
 def test_a_wide_sun_softens_it(context: Any) -> None:
     roof = quad([-9, -9, 0.5], [0, -9, 0.5], [0, 9, 0.5], [-9, 9, 0.5])
     receivers = build_plane(roof, footprint=0.05, sun_angle=0.8)

@@ -65,6 +65,7 @@ def error(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.sqrt(((found - expected) ** 2).mean() / (expected**2).mean()))
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("angle", [0.0, 0.02])
 def test_near_shadows_are_as_by_rays(context: Any, plain: Receivers, angle: float, monkeypatch: pytest.MonkeyPatch) -> None:
     covered = plain.images["coverage"] > 0

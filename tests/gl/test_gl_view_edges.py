@@ -58,6 +58,7 @@ def table_share() -> np.ndarray:
     return (x < EDGE).mean(axis=1)
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", LIGHTS)
 def test_a_pixel_with_two_surfaces_shows_both(context: Any, kind: str) -> None:
     """By the part of its filter that each fills, each lit at its own height."""
@@ -80,6 +81,7 @@ def test_a_pixel_with_two_surfaces_shows_both(context: Any, kind: str) -> None:
     assert found[mixed].mean() == pytest.approx(expected[mixed].mean(), rel=MEAN)
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("kind", LIGHTS)
 def test_materials_count_as_by_rays(context: Any, kind: str) -> None:
     receivers = view(albedo=OTHER)

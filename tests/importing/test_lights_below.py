@@ -93,6 +93,7 @@ def test_a_hemisphere_without_lights_is_refused(tmp_path: Path) -> None:
         assert done.exit_code == 1 and "above the horizon" in done.stderr and not (tmp_path / "asset").exists()
 
 
+@pytest.mark.lengthy
 def test_a_whole_sphere_has_no_far_lights(make_capture, tmp_path: Path) -> None:
     folder = make_capture(lambda d: np.full((2, 3, 3), max(0, d[2])), lights=60, domain="sphere").folder
     assert srbf("fit", folder, "-o", tmp_path / "asset", "-k", 9).exit_code == 0

@@ -31,6 +31,7 @@ def planted(clusters: int, components: int, seed: int = 0):
     return response, labels
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize(("clusters", "components"), [(1, 4), (4, 2), (5, 1)])
 def test_planted_clusters_are_reproduced(make_capture, clusters: int, components: int) -> None:
     response, labels = planted(clusters, components)
@@ -70,6 +71,7 @@ def test_every_scalar_spans_its_clusters_range(make_capture) -> None:
     assert not planes[..., 3].any()
 
 
+@pytest.mark.lengthy
 def test_bytes_cost_little(make_capture) -> None:
     response, _ = planted(4, 3, seed=5)
     capture = make_capture(response, lights=60, holdout=0).load()

@@ -47,6 +47,7 @@ def asset(capture: Capture) -> Asset:
     return DeepFramebuffer().encode(capture)
 
 
+@pytest.mark.lengthy
 def test_lights_that_no_one_rendered_are_relit(asset: Asset, capture: Capture) -> None:
     """The truth is of square cells of 25 cm, and of their centers: most of the error is its own."""
     assert evaluate(asset, capture)["holdout"]["relative_rmse"] < 0.11
@@ -56,6 +57,7 @@ def test_lights_that_no_one_rendered_are_relit(asset: Asset, capture: Capture) -
         np.testing.assert_allclose(picture[covered].sum(axis=0) / capture.image(index)[covered].sum(axis=0), 1, atol=0.05)
 
 
+@pytest.mark.lengthy
 def test_a_pixel_is_a_cluster_where_there_are_enough(tmp_path: Path, capture: Capture, asset: Asset) -> None:
     whole = DeepFramebuffer(nearest=1).encode(view_of_room(tmp_path / "whole", BOX, 2000))
     assert whole.manifest["gather"]["clusters"] == len(BOX.places) and asset.manifest["gather"]["clusters"] == 400
@@ -100,6 +102,7 @@ def test_a_light_that_moves_costs_one_and_equals_all_anew(asset: Asset) -> None:
         assert not rig.picture([]).any() and rig.computed == 5
 
 
+@pytest.mark.lengthy
 def test_the_asset_on_disk_is_the_asset(asset: Asset, tmp_path: Path) -> None:
     asset.save(tmp_path / "asset")
     again = Asset.open(tmp_path / "asset")
@@ -172,6 +175,7 @@ def test_an_asset_of_an_older_version_is_refused(asset: Asset, tmp_path: Path) -
         Asset.open(tmp_path / "asset")
 
 
+@pytest.mark.lengthy
 def test_light_from_behind_is_kept_in_files_and_at_some_pixels(asset: Asset, tmp_path: Path) -> None:
     """Of pixels alone, after a round trip; and what is let through is as much as transmittance says."""
     thin = with_backs(asset)

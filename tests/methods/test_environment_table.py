@@ -51,6 +51,7 @@ def off(found: np.ndarray, truth: np.ndarray) -> float:
     return float(np.linalg.norm(found - truth) / np.linalg.norm(truth))
 
 
+@pytest.mark.lengthy
 def test_the_table_gives_what_the_form_factors_and_rays_give(asset: Asset, capture: Capture) -> None:
     errors = environment_errors(asset, capture, 4)
     assert errors["count"] == 4 and errors["relative_rmse"] <= errors["worst"]
@@ -127,6 +128,7 @@ def test_captures_that_know_no_environment_are_relit_by_rays(asset: Asset, captu
     assert off(linear_response(without_environment_table(asset), [ENVIRONMENT]), linear_response(asset, [ENVIRONMENT])) < 0.08
 
 
+@pytest.mark.lengthy
 def test_relight_and_evaluate_use_the_table(asset: Asset, capture: Capture, tmp_path: Path) -> None:
     folder, environment = str(tmp_path / "asset"), str(tmp_path / "environment.exr")
     asset.save(Path(folder))

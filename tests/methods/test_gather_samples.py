@@ -150,6 +150,7 @@ def test_equal_points_are_one_cluster_and_few_points_each_their_own() -> None:
     assert (few[:, :5] == np.arange(5)).all() and (few[:, 5:] == -1).all()
 
 
+@pytest.mark.lengthy
 def test_a_capture_has_samples_whose_shares_are_the_albedo_of_a_closed_room(capture: Capture) -> None:
     """Of a room of two albedos all rays end on walls: the reflectance of a cluster is a mean of these."""
     found = GatheredSamples.read(capture.folder)

@@ -57,6 +57,7 @@ def test_unseen_point_lights_are_relit(asset: Asset, patches: Capture) -> None:
     assert asset.bytes_per_texel()["directional"] == 13
 
 
+@pytest.mark.lengthy
 def test_the_asset_on_disk_is_the_asset(asset: Asset, tmp_path: Path) -> None:
     asset.save(tmp_path / "asset")
     lights = [light((1.0, 1.0, 1.0)), SpotLight((2.0, 1.0, 1.5), falloff="inverse-square", direction=(0, 0, -1), inner=0.3, outer=0.5)]

@@ -93,6 +93,7 @@ def test_names_that_clash_are_refused(tmp_path: Path) -> None:
         LightMix().encode(twice)
 
 
+@pytest.mark.lengthy
 def test_more_than_a_thousand_names(tmp_path: Path) -> None:
     count = 1030
     names = tuple(f"Bulb {i:04d}" for i in range(count))

@@ -38,6 +38,7 @@ def bounced(asset: Asset, light: Any) -> np.ndarray:
     return methods.relight(asset, [light])
 
 
+@pytest.mark.lengthy
 def test_bounces_are_of_what_is_lit(asset: Asset) -> None:
     """Light on the red wall alone and on all others adds up to that on all; the wall's own is red."""
     every, red, gray = (bounced(asset, replace(LIGHT, receivers=one)) for one in (None, RED, GRAY))

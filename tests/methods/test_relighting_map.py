@@ -64,6 +64,7 @@ def plane(tmp_path_factory: pytest.TempPathFactory, plane_positions: np.ndarray)
 FIT = 0.02  # of a Lambert cosine by 60 Gaussians away from the horizon
 
 
+@pytest.mark.lengthy
 def test_lambert_under_a_directional_light(plane: Asset) -> None:
     for direction in ([0, 0, 1], [0.6, 0, 0.8], [-0.5, 0.5, np.sqrt(0.5)]):
         np.testing.assert_allclose(relight(plane, [DirectionalLight(tuple(direction))]), direction[2], atol=FIT)
@@ -171,6 +172,7 @@ def test_too_few_lights(make_capture) -> None:
     assert RelightingMap(k=25).encode(capture).k == 25
 
 
+@pytest.mark.lengthy
 def test_domain_follows_the_lights(make_capture) -> None:
     above = RelightingMap(k=9).encode(make_capture(lambert((3, 3)), name="above"))
     around = RelightingMap(k=9).encode(make_capture(lambert((3, 3)), domain="sphere", name="around"))
@@ -203,6 +205,7 @@ def test_a_moved_asset_is_lit_where_it_stands(plane: Asset) -> None:
     )
 
 
+@pytest.mark.lengthy
 def test_error_matches_its_definitions(make_capture) -> None:
     coverage = np.zeros((6, 8), np.float32)
     coverage[:, 2:] = 1

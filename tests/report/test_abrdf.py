@@ -61,6 +61,7 @@ def every_receiver() -> csr_array:
     return block_means(np.ones((HEIGHT, WIDTH), np.float32), (HEIGHT, WIDTH))
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("projection", ["equal-area", "orthographic", "latitude-longitude"])
 def test_lambert_tiles_are_the_cosine(lambert: Capture, projection: str) -> None:
     directions = tile_directions(20, projection)  # type: ignore[arg-type]

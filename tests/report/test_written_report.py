@@ -151,12 +151,14 @@ def test_without_holdout_lights_the_report_says_what_it_compares(make_capture: M
         assert_shows_something(tmp_path / name)
 
 
+@pytest.mark.lengthy
 def test_given_point_lights_replace_the_derived_ones(full: Case) -> None:
     point_light = PointLight((0.2, 0.1, 2.0), a0=2.0)
     subject = gather(full.asset, full.capture, full.evaluation, [point_light])
     assert subject.points == (point_light,) and len(subject.spots) == 6
 
 
+@pytest.mark.lengthy
 def test_another_capture_is_refused(full: Case, holed: Case, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="evaluation of the"):
         write_report(full.asset, full.capture, tmp_path, evaluation=holed.evaluation)

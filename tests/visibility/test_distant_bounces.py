@@ -56,6 +56,7 @@ def test_shapes_times_weights_are_the_bounces(surfels: Surfels, most: int | None
     assert found.rays > 2048 * len(BOX.places)
 
 
+@pytest.mark.lengthy
 def test_a_quarter_of_the_directions_tells_the_others_and_takes_fewer_rays(surfels: Surfels) -> None:
     whole, _ = traced(surfels, ORIGINS, CUBEMAP, OCCLUDERS, 4, Effort.full(len(BOX.places)))
     sparse, _ = traced(surfels, ORIGINS, CUBEMAP, OCCLUDERS, 4, Effort.sparse())
@@ -64,6 +65,7 @@ def test_a_quarter_of_the_directions_tells_the_others_and_takes_fewer_rays(surfe
     assert sparse.weights.shape[1:] == (CUBEMAP.count, 3)
 
 
+@pytest.mark.lengthy
 def test_a_seed_gives_the_same_again(surfels: Surfels) -> None:
     one, two = (traced(surfels, ORIGINS, CUBEMAP, OCCLUDERS, 2, Effort.sparse(), 9)[0] for _ in range(2))
     np.testing.assert_array_equal(one.shapes, two.shapes)

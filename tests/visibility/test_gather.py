@@ -59,6 +59,7 @@ def test_one_triangle_under_one_light() -> None:
     np.testing.assert_allclose(found, expected, rtol=0.03)
 
 
+@pytest.mark.lengthy
 def test_a_white_furnace_converges() -> None:
     """A closed box of albedo rho whose walls receive 1 gives rho / (1 - rho) everywhere, and a single bounce rho."""
     occluders = EmbreeTriangles(ROOM.corners)
@@ -75,6 +76,7 @@ def test_a_white_furnace_converges() -> None:
     np.testing.assert_allclose(operator.weights.sum(axis=1), 1, rtol=1e-5)
 
 
+@pytest.mark.lengthy
 def test_a_pool_is_fine_where_the_view_looks() -> None:
     occluders = EmbreeTriangles(ROOM.corners)
     found = surfaces_of(ROOM, 0.1)

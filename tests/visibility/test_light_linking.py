@@ -51,7 +51,7 @@ def shown_by(way: str, receivers: Receivers) -> Iterator[Any]:
         yield RayTracer(receivers)
         return
     pytest.importorskip("moderngl")
-    with ShadowMapper(receivers) as mapper:
+    with ShadowMapper(receivers, size=256) as mapper:
         yield mapper
 
 
@@ -66,6 +66,7 @@ def on_roof(receivers: Receivers) -> np.ndarray:
     return receivers.images["position"][..., 2] > 0.25
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("way", ["ray", "shadow-map"])
 def test_a_light_of_one_object_leaves_the_other_black(way: str) -> None:
     receivers = scene()
@@ -80,6 +81,7 @@ def test_a_light_of_one_object_leaves_the_other_black(way: str) -> None:
             assert one[roof].max() > 0.5 * every.max() and not shown.response([replace(light, receivers=Objects(only=()))]).any()
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("way", ["ray", "shadow-map"])
 def test_what_is_no_blocker_casts_no_shadow_and_is_lit(way: str) -> None:
     receivers = scene()
@@ -95,6 +97,7 @@ def test_what_is_no_blocker_casts_no_shadow_and_is_lit(way: str) -> None:
             np.testing.assert_allclose(kept, shaded, atol=SAME * shaded.max(), err_msg=name)
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("way", ["ray", "shadow-map"])
 def test_a_pane_that_is_no_blocker_tints_nothing(way: str) -> None:
     receivers, light = scene(panes=True), LIGHTS["point"]

@@ -54,7 +54,7 @@ def test_light_from_behind_passes(by: str, kind: str) -> None:
     if by == "rays":
         found, none = (RayTracer(receivers).response([one]) for one in (light, above))
     else:
-        with ShadowMapper(receivers) as mapper:
+        with ShadowMapper(receivers, size=512) as mapper:
             found, none = (mapper.response([one]) for one in (light, above))
     np.testing.assert_allclose(found.reshape(-1, 3), expected, atol=LOOKS * expected.max())
     assert (none == 0).all()

@@ -79,6 +79,7 @@ def test_cells_are_seen_above_their_surfels_and_parted_by_walls() -> None:
         assert not both.any()
 
 
+@pytest.mark.lengthy
 def test_what_receivers_see_does_not_jump() -> None:
     """A light slides 6 cm beside a wall, in front of which are boards: no step changes much of what it lays on the others."""
     boards = np.array([[[0.1, y, 0.0], [0.1, y + 0.1, 0.0], [0.1, y, 4.0]] for y in (0.9, 1.1, 1.3, 1.5)], np.float32)
@@ -137,6 +138,7 @@ def lit(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     return DeepFramebuffer().encode(view_of_room(tmp_path_factory.mktemp("near") / "capture", Room.box((3, 2, 2), 0.25, 0.6), 8000, 400))
 
 
+@pytest.mark.lengthy
 def test_pictures_have_no_blotches(lit: Asset) -> None:
     """Light 3 cm off a wall on the one across: even, where links alone scatter."""
     light = PointLight((0.03, 1.1, 0.9), falloff="inverse-square")
@@ -152,6 +154,7 @@ def test_pictures_have_no_blotches(lit: Asset) -> None:
     assert rough[1] < 0.4 * rough[0]
 
 
+@pytest.mark.lengthy
 def test_lights_still_add_up_in_their_colors(lit: Asset) -> None:
     one, other = (
         PointLight((0.03, 1.1, 0.9), (1, 0.5, 0.2), falloff="inverse-square"),
@@ -174,6 +177,7 @@ def test_light_is_reflected_as_often_as_by_links(lit: Asset, bounces: int) -> No
     assert bounces == 0 or found < 0.8 * linear_response(lit, [light]).sum()
 
 
+@pytest.mark.lengthy
 def test_an_asset_keeps_the_places(lit: Asset, tmp_path: Path) -> None:
     lit.save(tmp_path / "asset")
     light = [PointLight((0.03, 1.1, 0.9), falloff="inverse-square")]

@@ -78,6 +78,7 @@ def test_at_full_rank_depths_are_those_of_rays() -> None:
     assert (low <= start).all() and (start <= high).all()
 
 
+@pytest.mark.lengthy
 def test_a_roof_casts_its_shadow(below_a_roof: PcaDirect) -> None:
     """A light at (0.3, 0, 1) is hidden from x < -0.3."""
     receivers = below_a_roof.receivers
@@ -125,6 +126,7 @@ def rooms() -> PcaVisibility:
     return pca_visibility(STARTS, NORMALS, EmbreeTriangles(DOOR.corners), DOOR.free, 25)
 
 
+@pytest.mark.lengthy
 def test_few_points_of_two_rooms_are_misclassified(rooms: PcaVisibility) -> None:
     exact = RayShadows(STARTS, EmbreeTriangles(DOOR.corners))
     wrong = total = 0

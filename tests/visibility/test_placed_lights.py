@@ -57,6 +57,7 @@ def test_a_spot_with_a_size_has_a_soft_cone_and_the_energy_of_its_cone(kind: str
     assert ((share > 0.05) & (sharp == 0)).any() and ((share < 0.95) & (share > 0.5)).any()
 
 
+@pytest.mark.lengthy
 def test_an_area_is_cut_by_an_edge() -> None:
     """Behind the edge of a roof, a point sees what of the light is past the plane through itself and the edge."""
     roof = quad([-9, -9, 0.5], [0, -9, 0.5], [0, 9, 0.5], [-9, 9, 0.5])
@@ -93,6 +94,7 @@ def test_a_sphere_seen_past_an_edge_is_a_part_of_its_disc(light: Light) -> None:
     assert (share[x > 0.2] > 1 - 1e-3).all() and (share[x < -0.2] == 0).all()
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("angle", [0.1, 0.3])
 def test_each_sun_has_a_penumbra_of_its_own_angle(angle: float) -> None:
     """Past the edge of a roof 0.5 m up, a disc of that angle is cut off over 0.5 tan(angle)."""
@@ -130,6 +132,7 @@ def test_a_panel_at_its_own_mesh_shines() -> None:
     np.testing.assert_allclose(found, alone, rtol=1e-4)
 
 
+@pytest.mark.lengthy
 def test_penumbrae_of_a_room_have_no_speckles() -> None:
     receivers = room(64)
     covered = receivers.images["coverage"] > 0

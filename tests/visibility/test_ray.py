@@ -57,6 +57,7 @@ def test_a_ball_shades_its_disc(plane, sphere) -> None:
     assert (1 - found).mean() * 4 == pytest.approx(np.pi * 0.4**2, rel=0.01)  # 64 steps of polygon: 0.2 % less
 
 
+@pytest.mark.lengthy
 def test_a_wide_sun_makes_a_penumbra_of_its_width(plane, roof) -> None:
     """Straight below, the part of a disc seen past an edge: (acos(-t) + t sqrt(1 - t^2)) / pi, t = x / (h tan(angle / 2))."""
     angle = 0.8
@@ -138,6 +139,7 @@ def test_a_small_bright_sun_in_a_map_is_found(plane) -> None:
     assert expected.min() == 0 < expected.max()
 
 
+@pytest.mark.lengthy
 def test_many_lights_add_up_and_runs_repeat(plane, sphere) -> None:
     one, two = DirectionalLight((0.3, 0.1, 0.8)), PointLight((0.5, -0.4, 1.3), (0.5, 0.2, 1.0))
     tracer = RayTracer(plane(sphere))

@@ -21,6 +21,7 @@ def covered(mapped: Lightmap) -> np.ndarray:
     return mapped.receivers.images["coverage"] > 0
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("mapped", [True, False], ids=["with coordinates", "without"])
 @pytest.mark.parametrize("faces", [(12, 6), (24, 12), (64, 32)])
 @pytest.mark.parametrize("size", [48, pytest.param(96, marks=pytest.mark.slow)])
@@ -31,6 +32,7 @@ def test_a_flat_ball_alone_has_the_cosine_of_its_faces(faces: tuple[int, int], s
         np.testing.assert_allclose(found[..., 0][covered(made)], expected[covered(made)], atol=ROUNDING)
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("faces", [(24, 12), (64, 32)])
 @pytest.mark.parametrize("size", [48, pytest.param(96, marks=pytest.mark.slow)])
 def test_a_smooth_ball_alone_has_the_cosine_of_its_normals(faces: tuple[int, int], size: int) -> None:
@@ -52,6 +54,7 @@ def test_a_torus_is_shaded_by_itself_where_a_ray_from_its_center_says() -> None:
     assert abs(found.mean() - point.mean()) < 1e-3
 
 
+@pytest.mark.lengthy
 def test_far_from_the_origin_it_is_the_same() -> None:
     """Rays start as far off their surface as single precision there needs."""
     mapped = lightmap(sphere, 24, 12, 48, smooth=False)

@@ -37,6 +37,7 @@ def covered(operator: TransferOperator) -> np.ndarray:
     return np.diff(operator.receivers.indptr) > 0
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("albedo", [0.3, 0.8])
 def test_a_furnace(operator: TransferOperator, albedo: float) -> None:
     """Irradiance 1 everywhere, all walls of one albedo: receivers get rho / (1 - rho) more."""
@@ -73,6 +74,7 @@ def test_light_adds_up(operator: TransferOperator) -> None:
     np.testing.assert_allclose(found @ weights, (operator.receivers @ bounces.radiosity((lights @ weights)[:, None]))[:, 0], rtol=1e-4)
 
 
+@pytest.mark.lengthy
 def test_a_black_room_that_emits_radiance_1_gives_irradiance_pi(capture: Capture) -> None:
     """By form factors to points of what emits where that is far, and by rays where it is near."""
     corners = divided(BOX.corners, 0.3)
