@@ -16,7 +16,7 @@ from srbf.cubemap import Cubemap
 from srbf.errors import ImageError
 from srbf.io import files
 
-VISIBILITY_FILE, BOUNCES_FILE = "visibility.npz", "bounces.npz"
+VISIBILITY_FILE, BOUNCES_FILE, TESTED_FILE = "visibility.npz", "bounces.npz", "tested.npz"
 DAMAGE = (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile)
 
 
@@ -41,7 +41,7 @@ class CubemapTransport:
         found = np.zeros((len(columns), self.texels, 3), np.float32)
         rows = np.arange(len(self.receivers))
         own = self._bounces(rows, columns).transpose(1, 0, 2)
-        found[:, self.receivers] = own + self._direct(rows, columns).T[:, :, None] if direct else own
+        found[:, self.receivers] = own + self.cosines(rows, columns).T[:, :, None] if direct else own
         return found
 
     def rows(self, texels: Int[ndarray, " n"], columns: Int[ndarray, " b"], direct: bool = True) -> Float32[ndarray, "n b 3"]:
@@ -51,20 +51,33 @@ class CubemapTransport:
         found = np.zeros((len(texels), len(columns), 3), np.float32)
         found[real] = self._bounces(place[real], columns)
         if direct:
-            found[real] += self._direct(place[real], columns)[:, :, None]
+            found[real] += self.cosines(place[real], columns)[:, :, None]
         return found
 
     def seen(self, rows: Int[ndarray, " n"], columns: Int[ndarray, " b"]) -> Bool[ndarray, "n b"]:
         """Whether the n-th receivers see directions."""
         return (self.bits[rows][:, columns >> 3] >> (7 - (columns & 7)).astype(np.uint8) & 1).view(bool)
 
-    def _direct(self, rows: Int[ndarray, " n"], columns: Int[ndarray, " b"]) -> Float32[ndarray, "n b"]:
+    def cosines(self, rows: Int[ndarray, " n"], columns: Int[ndarray, " b"]) -> Float32[ndarray, "n b"]:
+        """Visibility times cosine of the n-th receivers."""
         directions = self.cubemap.directions[columns].astype(np.float32)
         return np.maximum(self.normals[rows] @ directions.T, 0) * self.seen(rows, columns)
 
     def _bounces(self, rows: Int[ndarray, " n"], columns: Int[ndarray, " b"]) -> Float32[ndarray, "n b 3"]:
         weights = self.weights[:, columns].reshape(len(self.weights), 3 * len(columns))
         return (self.shapes[rows] @ weights).reshape(len(rows), len(columns), 3)
+
+
+@dataclass(frozen=True, eq=False)
+class TestedTransport:
+    """What R receivers get of T lights that test a capture: bits (R, B) as of `CubemapTransport`, and irradiance of bounces."""
+
+    bits: ndarray
+    bounced: Float32[ndarray, "T R 3"]
+
+    def seen(self, index: int) -> Bool[ndarray, " R"]:
+        """Whether the receivers see a light."""
+        return (self.bits[:, index >> 3] >> (7 - (index & 7)) & 1).astype(bool)
 
 
 def write_arrays(path: Path, key: str, **arrays: Any) -> None:
@@ -90,6 +103,18 @@ def read_transport(folder: Path, told: dict[str, Any], texels: int) -> CubemapTr
     except OSError as error:
         raise _damaged(paths[0].parent) from error
     return _read(paths, stamps, int(told["side"]), texels)
+
+
+def read_tested(folder: Path, told: dict[str, Any], lights: int, receivers: int) -> TestedTransport:
+    """Of a capture's folder, by the key `cubemap` of its manifest. ImageError on a missing or damaged file."""
+    path = files.inside(folder, told["tested"], folder)
+    stored = stored_arrays(path)
+    if stored is None or not {"bits", "bounced"} <= set(stored):
+        raise _damaged(path.parent)
+    found = TestedTransport(stored["bits"], stored["bounced"].astype(np.float32))
+    if found.bits.shape != (receivers, -(-lights // 8)) or found.bounced.shape != (lights, receivers, 3):
+        raise _damaged(path.parent)
+    return found
 
 
 @lru_cache(maxsize=2)

@@ -15,11 +15,13 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.bake.surface_checks import warn_of_duplicates, warn_of_unlit
 from srbf.capture import Capture
+from srbf.channels import GLOSS
 from srbf.cubemap import Cubemap
-from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE, stored_arrays, write_arrays
+from srbf.cubemap_transport import BOUNCES_FILE, TESTED_FILE, VISIBILITY_FILE, stored_arrays, write_arrays
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.io.image import write_image
+from srbf.receiver_gloss import LEAST, ReceiverGloss
 from srbf.receiver_images import MANIFEST
 from srbf.sphere import random_directions
 from srbf.visibility.distant_bounces import DistantBounces, Effort, Mixture, light_on_surfels, traced
@@ -80,6 +82,7 @@ class _Stages:
     key: str
     progress: Progress
     say: Callable[[str], None]
+    gloss: int | None
 
     @cached_property
     def receivers(self) -> Receivers:
@@ -106,6 +109,8 @@ class _Stages:
         names = [repr(one["object"]) for one in self.described]
         what = names[0] if len(names) == 1 else f"{len(names)} objects"
         warn_of_unlit(is_lit, what, self.say)
+        if self.gloss is not None and not (self.lobes.strength > LEAST).any():
+            self.say(f"nothing of {what} is glossy: it looks the same from everywhere")
         if not self.is_lightmap:
             warn_of_duplicates(self.points.starts, self.points.normals, what, self.say)
 
@@ -202,14 +207,20 @@ class _Stages:
             for i, entry in enumerate(entries)
             if not all((self.capture.folder / entry[k]).is_file() for k in ("file", "direct") if k in entry)
         ]
+        if self.gloss is not None and stored_arrays(self.capture.folder / TESTED_FILE, self.key) is None:
+            missing = list(range(len(entries)))
         if missing:
             tracer = self.tracer(directions[missing])
-            seen = np.unpackbits(tracer.all_seen(), axis=1, count=len(missing))
+            bits = tracer.all_seen()
+            seen = np.unpackbits(bits, axis=1, count=len(missing))
             direct = seen * np.maximum(tracer.normals @ tracer.directions.T, 0)
             lit = light_on_surfels(self.surfels, directions[missing], self.occluders)[0]
             transfer = bounces["from_surfels"].astype(np.float32)
             weights = np.stack([transfer[:, :, c] @ lit for c in range(3)], axis=2)
             shapes = bounces["shapes"].astype(np.float32)
+            if self.gloss is not None and len(missing) == len(entries):
+                bounced = np.stack([shapes @ weights[:, number] for number in range(len(missing))])
+                write_arrays(self.capture.folder / TESTED_FILE, self.key, bits=bits, bounced=bounced.astype(np.float16))
             for number, i in enumerate(missing):
                 self._write_tested(entries[i], direct[:, number], shapes @ weights[:, number])
                 self.progress(number + 1, len(missing), "lights that test")
@@ -221,7 +232,17 @@ class _Stages:
             write_image(self.capture.folder / entry["direct"], self._image(white), "half")
         else:
             reflected = reflected + white
-        write_image(self.capture.folder / entry["file"], self._image(reflected), "half")
+        image = self._image(reflected)
+        if self.gloss is not None:
+            lit = np.flatnonzero(direct > 0)
+            image.reshape(-1, 3)[self.points.texels[lit]] += self.lobes.from_above(lit, direct[lit].astype(np.float64))
+        write_image(self.capture.folder / entry["file"], image, "half")
+
+    @cached_property
+    def lobes(self) -> ReceiverGloss:
+        """Of the points."""
+        glossy, lobe = (self.receivers.images[name].reshape(-1, 3)[self.points.texels] for name in GLOSS)
+        return ReceiverGloss.of(glossy, lobe, self.points.normals)
 
     def _image(self, irradiance: Float32[ndarray, "R 3"]) -> Float32[ndarray, "H W 3"]:
         """In the capture's quantity; 0 where there is no receiver."""
@@ -241,13 +262,15 @@ def trace_cubemap(
     seed: int,
     progress: Progress,
     say: Callable[[str], None],
+    gloss: int | None = None,
 ) -> dict[str, Any]:
     """The files of a capture under `cubemap` into the folder of `capture`, which has no lights; the keys of its manifest.
 
-    `checksum`: of what is known of the scene. `roles`: how many lights validate and are held out.
+    `checksum`: of what is known of the scene. `roles`: how many lights validate and are held out. `gloss`: how many terms its receivers'
+    gloss shall have; they cost no ray.
     """
     key = f"{checksum} {capture.width}x{capture.height} {cubemap.side} {sampling} {seed}"
-    stages = _Stages(capture, surfels, bounces, cubemap, sampling, seed, key, progress, say)
+    stages = _Stages(capture, surfels, bounces, cubemap, sampling, seed, key, progress, say, gloss)
     visibility = stages.visibility()
     chosen = str(visibility["sampling"])
     reflected = stages.reflected(chosen)
@@ -265,7 +288,11 @@ def trace_cubemap(
         "rays": rays,
         "sampled": sampled,
     }
-    return {"cubemap": told if chosen == "full" else {**told, "predicted_error": error}, "lights": entries}
+    if chosen != "full":
+        told["predicted_error"] = error
+    if gloss is not None:
+        told |= {"gloss": {"terms": gloss}, "tested": TESTED_FILE}
+    return {"cubemap": told, "lights": entries}
 
 
 def totals(folders: Sequence[Path]) -> dict[str, Any] | None:
