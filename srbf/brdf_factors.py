@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64, Int
 from srbf.errors import InputError
-from srbf.microfacets import alpha_of, parts_of
+from srbf.microfacets import albedo_terms, alpha_of, parts_of
 
 MOST_TERMS = 64
 STEPS, TURNS = 72, 128  # between the normal and the horizon; over half a turn
@@ -120,8 +120,9 @@ def _by_order(roughness: float) -> Float64[ndarray, "2 M A A"]:
     viewer, light = (np.broadcast_to(values, shape).ravel() for values in (middles[:, None, None], middles[None, :, None]))
     NoV, NoL = np.cos(viewer), np.cos(light)
     VoL = NoV * NoL + np.sin(viewer) * np.sin(light) * np.broadcast_to(np.cos(turn), shape).ravel()
-    alpha = np.full(len(NoV), float(alpha_of(np.array([roughness]))[0]))
-    found = np.stack(parts_of(NoL, NoV, VoL, alpha)).reshape(2, *shape)
+    alpha = float(alpha_of(np.array([roughness]))[0])
+    whole = np.repeat(albedo_terms(np.cos(middles), np.full(STEPS, alpha))[0], STEPS * TURNS)
+    found = np.stack(parts_of(NoL, NoV, VoL, np.full(len(NoV), alpha), whole)).reshape(2, *shape)
     waves = np.cos(np.arange(ORDERS)[:, None] * turn) * np.where(np.arange(ORDERS) > 0, 2.0, 1.0)[:, None] / TURNS
     return np.moveaxis(found @ waves.T, 3, 1)
 

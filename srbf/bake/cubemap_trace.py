@@ -207,7 +207,8 @@ class _Stages:
             for i, entry in enumerate(entries)
             if not all((self.capture.folder / entry[k]).is_file() for k in ("file", "direct") if k in entry)
         ]
-        if self.gloss is not None and stored_arrays(self.capture.folder / TESTED_FILE, self.key) is None:
+        unknown = self.gloss is not None and stored_arrays(self.capture.folder / TESTED_FILE, self.key) is None
+        if unknown:
             missing = list(range(len(entries)))
         if missing:
             tracer = self.tracer(directions[missing])
@@ -218,7 +219,7 @@ class _Stages:
             transfer = bounces["from_surfels"].astype(np.float32)
             weights = np.stack([transfer[:, :, c] @ lit for c in range(3)], axis=2)
             shapes = bounces["shapes"].astype(np.float32)
-            if self.gloss is not None and len(missing) == len(entries):
+            if unknown:
                 bounced = np.stack([shapes @ weights[:, number] for number in range(len(missing))])
                 write_arrays(self.capture.folder / TESTED_FILE, self.key, bits=bits, bounced=bounced.astype(np.float16))
             for number, i in enumerate(missing):
