@@ -1,4 +1,4 @@
-"""Captures under a cubemap of a ground below a ball, in closed form but for the ball's shadow."""
+"""Captures under a cubemap of a ground below a ball, in closed form except the shadow of the ball."""
 
 from __future__ import annotations
 

@@ -292,7 +292,7 @@ def trace_cubemap(
     if chosen != "full":
         told["predicted_error"] = error
     if gloss is not None:
-        told |= {"gloss": {"terms": gloss}, "tested": TESTED_FILE}
+        told |= {"gloss": {"terms": gloss}, **({"tested": TESTED_FILE} if entries else {})}
     return {"cubemap": told, "lights": entries}
 
 
