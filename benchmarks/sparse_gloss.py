@@ -44,6 +44,13 @@ class Rows:
         directions, gloss = self._directions(), self._capture.receiver_gloss
         diffuse = self.diffuse()
         found = np.repeat(diffuse[None], len(self._viewers), axis=0)
+        transport = self._capture._transport
+        if transport.harmonics is not None:
+            waves = transport.harmonics[:, self.rows]  # (K, n, r)
+            mixed = np.einsum("rlc,lm->rmc", transport.weights, self._lights, optimize=True)
+            for v, viewer in enumerate(self._viewers):
+                toward = gloss.of_bounces(np.broadcast_to(viewer, gloss.normals.shape))[self.rows]  # (n, K, 3)
+                found[v] += np.einsum("knr,nkc,rmc->nmc", waves, toward, mixed, optimize=True)
         for start in range(0, len(self.rows), STEP):
             own = self.rows[start : start + STEP]
             row, column = np.nonzero(self._seen(own))
@@ -66,6 +73,10 @@ class Rows:
             matrix = np.zeros((terms, len(own), len(directions)), np.float32)
             matrix[:, row, column] = factors.of_lights(own[row], directions[column]).T
             lit[start : start + len(own)] = (matrix @ self._lights).transpose(1, 0, 2)
+        transport = self._capture._transport
+        if transport.harmonics is not None:
+            mixed = transport.weights.mean(axis=2) @ self._lights  # (r, M)
+            lit += np.einsum("knr,njk,rm->njm", transport.harmonics[:, self.rows], factors.of_bounces()[self.rows], mixed, optimize=True)
         found = np.repeat(self.diffuse()[None], len(self._viewers), axis=0)
         for v, viewer in enumerate(self._viewers):
             toward = factors.of_viewers(np.broadcast_to(viewer, gloss.normals.shape))[self.rows]  # (n, k, 3)

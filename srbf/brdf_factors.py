@@ -9,12 +9,14 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64, Int
+from srbf.basis.exitant_harmonics import harmonics
 from srbf.errors import InputError
 from srbf.microfacets import albedo_terms, alpha_of, parts_of
 
 MOST_TERMS = 64
 STEPS, TURNS = 72, 128  # between the normal and the horizon; over half a turn
 ORDERS = 40  # of turns about the normal
+BOUNCE_ORDER = 3  # of the harmonics that bounced light is known by
 LEAST_ROUGHNESS = 0.2  # sharper lobes are factored as one of this: their peaks are narrower than the steps
 
 
@@ -88,6 +90,38 @@ def factored(roughness: float, along: float, grazing: float, terms: int) -> Brdf
     scale = np.sqrt(np.maximum(3 * shares * (toward**2 @ viewers) / viewers.sum(), 1e-30))[:, None]
     orders = np.array([m for m, _ in chosen], np.int64)
     return BrdfFactors(orders, _ended(orders, incoming * scale), _ended(orders, outgoing / scale), max(0.0, 1 - kept / whole))
+
+
+def of_bounces(factors: BrdfFactors) -> Float32[ndarray, "n K"]:
+    """What each f_i makes of bounced light: the integral of f_i L is about the sum over k of these times that of y_k NoL L."""
+    orders, profiles, inverse = _waves()
+    middles = ANGLES[1:-1]
+    overlaps = (factors.incoming[:, 1:-1] * np.sin(middles)) @ profiles.T
+    return np.where(factors.orders[:, None] == orders, overlaps, 0).astype(np.float32) @ inverse.astype(np.float32)
+
+
+@lru_cache(maxsize=64)
+def viewers_of_bounces(roughness: float) -> Float32[ndarray, "2 K A"]:
+    """The same of the whole BRDF toward viewers: by angle, times h of the order of y_k, for either end of the Fresnel term."""
+    orders, profiles, inverse = _waves()
+    of_order = _by_order(max(roughness, LEAST_ROUGHNESS))[:, np.abs(orders)]  # (2, K, A, A)
+    overlaps = np.einsum("ekvl,kl->ekv", of_order, profiles * np.sin(ANGLES[1:-1]))
+    return _ended(orders, np.einsum("jk,ekv->ejv", inverse, overlaps)).astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def _waves() -> tuple[Int[ndarray, " K"], Float64[ndarray, "K A"], Float64[ndarray, "K K"]]:
+    """(m of harmonics as of terms, their values where h_m is 1, the inverse of their products by NoL over the hemisphere without turns)."""
+    middles = ANGLES[1:-1]
+    orders = np.concatenate([np.arange(-degree, degree + 1) for degree in range(BOUNCE_ORDER + 1)])
+    profiles = np.empty((len(orders), STEPS))
+    for k, m in enumerate(orders.tolist()):
+        turn = 0 if m >= 0 else np.pi / (2 * -m)
+        across = np.sin(middles)
+        places = np.stack([across * np.cos(turn), across * np.sin(turn), np.cos(middles)], axis=1)
+        profiles[k] = harmonics(places, BOUNCE_ORDER)[:, k]
+    gram = (profiles * np.sin(middles) * np.cos(middles)) @ profiles.T
+    return orders, profiles, np.linalg.inv(np.where(orders[:, None] == orders, gram, 0))
 
 
 def turned(orders: Int[ndarray, " n"], local: Float[ndarray, "d 3"]) -> Float32[ndarray, "d n"]:

@@ -87,37 +87,42 @@ class CubemapCapture(Capture):
     def toward(self, index: int, viewers: Float[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
         """Radiance of a light toward unit directions at every texel, by the whole BRDF and visibility as it was traced.
 
-        Of a train light visibility is that of the capture's sampling. Bounces reflect diffusely. 0 where there is no receiver.
+        Of a train light visibility is that of the capture's sampling. Gloss reflects bounced light as far as harmonics tell where it comes
+        from. 0 where there is no receiver.
         """
-        lit, diffuse = self.received(index)
+        lit, diffuse, waves = self.received(index)
         texels = self.receivers[lit]
         found = np.zeros((self.height * self.width, 3), np.float32)
         found[self.receivers] = diffuse
+        if len(waves):
+            seen = self.receiver_gloss.of_bounces(viewers.reshape(-1, 3)[self.receivers])
+            found[self.receivers] += np.einsum("krc,rkc->rc", waves, seen)
         direction = np.broadcast_to(np.array(self.lights[index].direction), (len(lit), 3))
         found[texels] += self.receiver_gloss.reflected(lit, direction, viewers.reshape(-1, 3)[texels])
         return found.reshape(self.height, self.width, 3)
 
-    def received(self, index: int) -> tuple[Int[ndarray, " n"], Float32[ndarray, "R 3"]]:
-        """(receivers that a light shines on, radiance of what all of them reflect diffusely)."""
+    def received(self, index: int) -> tuple[Int[ndarray, " n"], Float32[ndarray, "R 3"], Float32[ndarray, "K R 3"]]:
+        """(receivers that a light shines on, radiance of what all of them reflect diffusely, harmonics of what bounces bring)."""
         transport, light = self._transport, self.lights[index]
         rows = np.arange(len(transport.receivers))
         if light.column is None:
             own = [entry["file"] for entry in self.manifest["lights"]].index(light.file)
-            seen, irradiance = self._tested.seen(own), self._tested.bounced[own].copy()
+            seen, weights = self._tested.seen(own), self._tested.weights[own]
         else:
-            column = np.array([light.column])
-            seen, irradiance = transport.seen(rows, column)[:, 0], transport.rows(transport.receivers, column, direct=False)[:, 0]
+            seen, weights = transport.seen(rows, np.array([light.column]))[:, 0], transport.weights[:, light.column]
+        irradiance = transport.shapes @ weights
         cosine = transport.normals @ np.array(light.direction, np.float32)
         lit = np.flatnonzero(seen & (cosine > 0))
         irradiance[lit] += cosine[lit, None]
         factor = self._reflectance
         assert factor is not None
-        return lit, irradiance * factor[transport.receivers]
+        waves = np.zeros((0, len(rows), 3), np.float32) if transport.harmonics is None else transport.harmonics @ weights
+        return lit, irradiance * factor[transport.receivers], waves
 
     @cached_property
     def _tested(self) -> TestedTransport:
         lights = len(self.manifest["lights"])
-        return read_tested(self.folder, self.manifest["cubemap"], lights, len(self._transport.receivers))
+        return read_tested(self.folder, self.manifest["cubemap"], lights, len(self._transport.receivers), len(self._transport.weights))
 
     def _rows_of_texels(self, texels: Int[ndarray, " n"]) -> tuple[Int[ndarray, " n"], Bool[ndarray, " n"]]:
         """(the receiver of each texel, whether it has one)."""
@@ -125,12 +130,22 @@ class CubemapCapture(Capture):
         place = np.minimum(np.searchsorted(receivers, texels), max(0, len(receivers) - 1))
         return place, receivers[place] == texels
 
+    @cached_property
+    def _bounces_from_above(self) -> Float32[ndarray, "R r 3"]:
+        """Shapes of what gloss reflects of bounces straight up, by color."""
+        transport = self._transport
+        if transport.harmonics is None:
+            return np.zeros((*transport.shapes.shape, 3), np.float32)
+        seen = self.receiver_gloss.of_bounces(transport.normals)
+        return np.einsum("krj,rkc->rjc", transport.harmonics, seen, optimize=True)
+
     def _from_above(self, rows: Int[ndarray, " n"], columns: Int[ndarray, " b"]) -> Float32[ndarray, "n b 3"]:
         """What gloss reflects of single directions straight up."""
         cosines = self._transport.cosines(rows, columns)
-        found = np.zeros((*cosines.shape, 3), np.float32)
+        shapes, weights = self._bounces_from_above[rows], self._transport.weights[:, columns]
+        found = np.stack([shapes[:, :, c] @ weights[:, :, c] for c in range(3)], axis=2)
         row, column = np.nonzero(cosines)
-        found[row, column] = self.receiver_gloss.from_above(rows[row], cosines[row, column].astype(np.float64))
+        found[row, column] += self.receiver_gloss.from_above(rows[row], cosines[row, column].astype(np.float64))
         return found
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy import ndarray
@@ -24,7 +25,7 @@ class GlossyTerms(CubemapCapture):
 
     The first image of a light is the radiance of diffuse reflection, the next are T_1 T_2 T_3, T_4 T_5 T_6, ...; terms past the last are 0.
     B(p, v) = T_0(p, l) + sum_i g_i(p, v) T_i(p, l) is the radiance toward v [Huang2010, eq. 3]. No ray is traced for any term: the
-    capture has visibility, and f_i is known.
+    capture has visibility, harmonics of bounced light, of which terms take the mean over colors, and f_i is known.
     """
 
     factors: FactoredGloss
@@ -53,6 +54,14 @@ class GlossyTerms(CubemapCapture):
     def groups(self) -> int:
         """Images of a light."""
         return groups_of(self.factors.terms)
+
+    @cached_property
+    def _bounces(self) -> Float32[ndarray, "R n r"]:
+        """Shapes of what T_i have of bounces."""
+        transport = self._transport
+        if transport.harmonics is None:
+            return np.zeros((len(transport.receivers), self.factors.terms, transport.shapes.shape[1]), np.float32)
+        return np.einsum("krj,rnk->rnj", transport.harmonics, self.factors.of_bounces(), optimize=True)
 
     @property
     def angles(self) -> Float64[ndarray, " L"]:
@@ -99,6 +108,8 @@ class GlossyTerms(CubemapCapture):
             terms = np.zeros((len(rows), len(lights), COLORS * (self.groups - 1)), np.float32)
             directions = self._transport.cubemap.directions
             terms[row, column, : self.factors.terms] = self.factors.of_lights(rows[row], directions[lights[column]])
+            bounced = self._bounces[rows]
+            terms[:, :, : self.factors.terms] += (bounced @ self._transport.weights[:, lights].mean(axis=2)).transpose(0, 2, 1)
             own = terms.reshape(len(rows), len(lights), self.groups - 1, COLORS)
             found[:, np.flatnonzero(group > 0)] = own[:, back, group[group > 0] - 1]
         return found

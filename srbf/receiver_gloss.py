@@ -10,7 +10,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64, Int
-from srbf.brdf_factors import ANGLES, BrdfFactors, factored
+from srbf.brdf_factors import ANGLES, BOUNCE_ORDER, BrdfFactors, factored, interpolated, of_bounces, turned, viewers_of_bounces
 from srbf.compute.threads import each
 from srbf.microfacets import albedo_terms, alpha_of, ends_of, parts_of
 
@@ -68,6 +68,20 @@ class ReceiverGloss:
         even, grazing = parts_of(NoL, np.maximum(NoV, 0), np.einsum("nc,nc->n", lights, flat), self.alpha[rows])
         return even[:, None] * self.along[rows] + grazing[:, None] * self.grazing[rows]
 
+    def of_bounces(self, viewers: Float[ndarray, "R 3"]) -> Float32[ndarray, "R K 3"]:
+        """What of each harmonic of bounced light is reflected toward unit directions, roughness as of the nearest class."""
+        classes = self.classes()
+        local = np.einsum("nij,nj->ni", framed(self.normals), viewers)
+        index, _ = _placed(self, classes)
+        orders = np.concatenate([np.arange(-degree, degree + 1) for degree in range(BOUNCE_ORDER + 1)])
+        found = np.zeros((len(viewers), len(orders), 3), np.float32)
+        for k, (roughness, _, _) in enumerate(classes):
+            own = np.flatnonzero((index == k) & (self.strength > LEAST))
+            even, grazing = (turned(orders, local[own]) * interpolated(table, local[own, 2]) for table in viewers_of_bounces(roughness))
+            ends = [end[own].astype(np.float32) for end in (self.along, self.grazing)]
+            found[own] = even[:, :, None] * ends[0][:, None] + grazing[:, :, None] * ends[1][:, None]
+        return found
+
     def classes(self) -> list[tuple[float, float, float]]:
         """(roughness, mean reflectance along the normal, at grazing) of at most MOST_CLASSES groups that all receivers are near to."""
         shown = self.strength > LEAST
@@ -123,6 +137,11 @@ class FactoredGloss:
 
         each(work, len(starts))
         return found
+
+    def of_bounces(self) -> Float32[ndarray, "R n K"]:
+        """What T_i have of each harmonic of bounced light."""
+        found = np.stack([of_bounces(one) for one in self.factors])[self.index]
+        return found * self.relative[:, None, None].astype(np.float32)
 
     def of_viewers(self, viewers: Float[ndarray, "R 3"]) -> Float32[ndarray, "R k 3"]:
         """g_i of the receivers toward unit directions, by color."""

@@ -29,10 +29,12 @@ def made(
     uncovered: int = 7,
     rank: int = RANK,
     roughness: np.ndarray | None = None,
+    bounced_gloss: bool = False,
 ) -> Capture:
     """A ground of WIDTH x HEIGHT places below a ball, the last few texels empty; bounces of made-up shapes; two lights that test.
 
-    With a `roughness` (HEIGHT, WIDTH) it is of colored metal on the left and of plastic on the right.
+    With a `roughness` (HEIGHT, WIDTH) it is of colored metal on the left and of plastic on the right; `bounced_gloss`: with harmonics of
+    bounces, made up, too.
     """
     rng = np.random.default_rng(4)
     cubemap = Cubemap(SIDE)
@@ -49,7 +51,12 @@ def made(
     (folder / "lights").mkdir(parents=True)
     write_arrays(folder / VISIBILITY_FILE, "made", bits=tracer.all_seen(), receivers=receivers.astype(np.int32), normals=normals)
     shapes, weights = rng.random((len(receivers), rank), np.float32), 0.1 * rng.random((rank, cubemap.count, 3), np.float32)
-    write_arrays(folder / BOUNCES_FILE, "made", shapes=shapes, weights=weights)
+    waves = (
+        {}
+        if roughness is None or not bounced_gloss
+        else {"harmonics": 0.3 * np.random.default_rng(5).random((16, len(receivers), rank), np.float32)}
+    )
+    write_arrays(folder / BOUNCES_FILE, "made", shapes=shapes, weights=weights, **waves)
     images = {
         "position": position,
         "coverage": coverage.reshape(HEIGHT, WIDTH, 1),
@@ -60,7 +67,7 @@ def made(
         images |= gloss_of(roughness)
         channels = {"channels": {name: {"file": f"{name}.exr", "components": 3} for name in ("glossy", "lobe")}}
         tested = ElementTracer(starts, normals, np.array(TESTED, np.float32), tracer.occluders)
-        write_arrays(folder / TESTED_FILE, "made", bits=tested.all_seen(), bounced=0.1 * rng.random((2, len(receivers), 3), np.float32))
+        write_arrays(folder / TESTED_FILE, "made", bits=tested.all_seen(), weights=0.1 * rng.random((2, rank, 3), np.float32))
     for name, image in images.items():
         write_image(folder / f"{name}.exr", image, "float")
     lights = []

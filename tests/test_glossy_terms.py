@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from made_cubemaps import HEIGHT, SIDE, TESTED, WIDTH, made
 
+from srbf.brdf_factors import MOST_TERMS
 from srbf.capture import Capture
 from srbf.cubemap import Cubemap
 from srbf.cubemap_capture import CubemapCapture
@@ -52,7 +53,8 @@ def test_radiance_toward_a_viewer_is_diffuse_reflection_and_the_lobe(capture: Cu
     index = capture.indices("holdout")[place]
     direction = np.array(TESTED[place])
     with np.load(capture.folder / TESTED_FILE) as stored:
-        seen, bounced = np.unpackbits(stored["bits"], axis=1)[:, place], stored["bounced"][place]
+        seen = np.unpackbits(stored["bits"], axis=1)[:, place]
+        bounced = np.load(capture.folder / BOUNCES_FILE)["shapes"] @ stored["weights"][place]
     image = capture.geometry("albedo")
     assert image is not None
     albedo = image.reshape(-1, 3)[capture.receivers]
@@ -99,6 +101,31 @@ def test_terms_and_their_viewers_are_the_radiance(capture: CubemapCapture, terms
     assert np.linalg.norm(found - true) < most * np.linalg.norm(true - diffuse)
     rows = split.sample([column * split.groups + 1], capture.receivers[:9])
     np.testing.assert_allclose(rows[:, 0], images[1][:9], rtol=1e-6)
+
+
+@pytest.mark.parametrize("terms", [2, 64])
+def test_gloss_shows_bounces_and_terms_their_mean_color(tmp_path: Path, terms: int) -> None:
+    """Where no light shines directly: a direction from below. All terms together are the whole BRDF."""
+    without, capture = (made(tmp_path / str(more), quantity="radiance", roughness=ROUGH, bounced_gloss=more) for more in (False, True))
+    assert isinstance(without, CubemapCapture) and isinstance(capture, CubemapCapture)
+    below = int(Cubemap(SIDE).texel_of(np.array([[0.1, 0.1, -1.0]]))[0])
+    more = (capture.toward(below, WAYS) - without.toward(below, WAYS)).reshape(-1, 3)[capture.receivers]
+    with np.load(capture.folder / BOUNCES_FILE) as stored:
+        waves = np.einsum("krj,jc->krc", stored["harmonics"], stored["weights"][:, below])
+    gloss = capture.receiver_gloss
+    viewers = np.broadcast_to(SLANTED, gloss.normals.shape)
+    np.testing.assert_allclose(more, np.einsum("krc,rkc->rc", waves, gloss.of_bounces(viewers)), rtol=1e-4, atol=1e-6)
+    up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (HEIGHT, WIDTH, 3))
+    np.testing.assert_allclose(capture.image(below), capture.toward(below, up), rtol=1e-4, atol=1e-6)
+    factors = FactoredGloss.of(gloss, gloss.classes(), terms)
+    split = GlossyTerms.of(capture, factors)
+    images = [split.image(below * split.groups + group).reshape(-1, 3)[capture.receivers] for group in range(1, split.groups)]
+    parts = np.concatenate(images, axis=1)[:, :terms]
+    np.testing.assert_allclose(parts, np.einsum("krc,rnk->rn", waves / 3, factors.of_bounces(), optimize=True), rtol=1e-3, atol=1e-5)
+    if terms == MOST_TERMS:
+        gray = np.einsum("kr,rkc->rc", waves.mean(axis=2), gloss.of_bounces(viewers))
+        found = np.einsum("rn,rnc->rc", parts, factors.of_viewers(viewers))
+        assert np.linalg.norm(found - gray) < 0.02 * np.linalg.norm(gray)
 
 
 def test_a_quarter_of_the_directions_has_the_same_images(capture: CubemapCapture) -> None:

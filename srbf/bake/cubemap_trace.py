@@ -178,11 +178,13 @@ class _Stages:
                 effort,
                 self.seed,
                 lambda done, total: self.progress(done, total, "bounces"),
+                self.gloss is not None,
             )
         arrays: dict[str, ndarray] = {
             "shapes": bounces.shapes.astype(np.float16),
             "weights": bounces.weights.astype(np.float16),
             "from_surfels": mixture.transfer.astype(np.float16),
+            **({} if bounces.harmonics is None else {"harmonics": bounces.harmonics.astype(np.float16)}),
             "rays": np.array(bounces.rays),
             "cpu_seconds": np.array(time.process_time() - began),
         }
@@ -220,14 +222,24 @@ class _Stages:
             weights = np.stack([transfer[:, :, c] @ lit for c in range(3)], axis=2)
             shapes = bounces["shapes"].astype(np.float32)
             if unknown:
-                bounced = np.stack([shapes @ weights[:, number] for number in range(len(missing))])
-                write_arrays(self.capture.folder / TESTED_FILE, self.key, bits=bits, bounced=bounced.astype(np.float16))
+                write_arrays(self.capture.folder / TESTED_FILE, self.key, bits=bits, weights=weights.transpose(1, 0, 2))
+            straight_up = None
+            if self.gloss is not None and "harmonics" in bounces:
+                straight_up = self.lobes.of_bounces(self.points.normals)  # (R, K, 3)
             for number, i in enumerate(missing):
-                self._write_tested(entries[i], direct[:, number], shapes @ weights[:, number])
+                gloss = 0.0
+                if straight_up is not None:
+                    gloss = np.einsum(
+                        "krj,jc,rkc->rc", bounces["harmonics"].astype(np.float32), weights[:, number], straight_up, optimize=True
+                    )
+                self._write_tested(entries[i], direct[:, number], shapes @ weights[:, number], gloss)
                 self.progress(number + 1, len(missing), "lights that test")
         return entries
 
-    def _write_tested(self, entry: dict[str, Any], direct: Float32[ndarray, " R"], reflected: Float32[ndarray, "R 3"]) -> None:
+    def _write_tested(
+        self, entry: dict[str, Any], direct: Float32[ndarray, " R"], reflected: Float32[ndarray, "R 3"], gloss: ndarray | float
+    ) -> None:
+        """`gloss`: radiance of what lobes reflect of bounces."""
         white = np.repeat(direct[:, None], 3, axis=1).astype(np.float32)
         if "direct" in entry:
             write_image(self.capture.folder / entry["direct"], self._image(white), "half")
@@ -236,6 +248,7 @@ class _Stages:
         image = self._image(reflected)
         if self.gloss is not None:
             lit = np.flatnonzero(direct > 0)
+            image.reshape(-1, 3)[self.points.texels] += gloss
             image.reshape(-1, 3)[self.points.texels[lit]] += self.lobes.from_above(lit, direct[lit].astype(np.float64))
         write_image(self.capture.folder / entry["file"], image, "half")
 
@@ -270,7 +283,7 @@ def trace_cubemap(
     `checksum`: of what is known of the scene. `roles`: how many lights validate and are held out. `gloss`: how many terms its receivers'
     gloss shall have; they cost no ray.
     """
-    key = f"{checksum} {capture.width}x{capture.height} {cubemap.side} {sampling} {seed}"
+    key = f"{checksum} {capture.width}x{capture.height} {cubemap.side} {sampling} {seed}{'' if gloss is None else ' gloss'}"
     stages = _Stages(capture, surfels, bounces, cubemap, sampling, seed, key, progress, say, gloss)
     visibility = stages.visibility()
     chosen = str(visibility["sampling"])

@@ -106,7 +106,9 @@ def glossy_errors(
 
 def _factored(capture: CubemapCapture, factors: FactoredGloss, index: int) -> tuple[Float32[ndarray, "R 3"], Float32[ndarray, "R k"]]:
     """(diffuse radiance, T_i) of all receivers under a light, as traced."""
-    lit, diffuse = capture.received(index)
+    lit, diffuse, waves = capture.received(index)
     terms = np.zeros((len(diffuse), factors.terms), np.float32)
-    terms[lit] = factors.of_lights(lit, np.broadcast_to(np.array(capture.lights[index].direction), (len(lit), 3)))
+    if len(waves):
+        terms += np.einsum("krc,rnk->rn", waves / 3, factors.of_bounces(), optimize=True)
+    terms[lit] += factors.of_lights(lit, np.broadcast_to(np.array(capture.lights[index].direction), (len(lit), 3)))
     return diffuse, terms
