@@ -34,15 +34,15 @@ SUNS = 200
 LOBES = 6
 
 
-def prepared(scene: Path, name: str, folder: Path) -> Path:
-    """The receivers, the scene and its surfels, by a bake of the smallest cubemap."""
-    words = ["--receiver", f"vertices:{name}", "--light-set", "cubemap:2", "--validation", "0", "--holdout", "0", "--seed", "77"]
+def prepared(scene: Path, name: str, folder: Path, *more: str) -> Path:
+    """The receivers, the scene and its surfels, by a bake of the smallest cubemap with `more` words."""
+    words = ["--receiver", f"vertices:{name}", "--light-set", "cubemap:2", "--validation", "0", "--holdout", "0", "--seed", "77", *more]
     subprocess.run([sys.executable, "-m", "srbf", "bake", scene, "-o", folder / name, *words], check=True, capture_output=True)
     return folder / name
 
 
-def traced(source: Path, way: str, side: int) -> tuple[Capture, dict[str, float]]:
-    """(the capture of one way of sampling, its figures)."""
+def traced(source: Path, way: str, side: int, gloss: int | None = None) -> tuple[Capture, dict[str, float]]:
+    """(the capture of one way of sampling, its figures); `gloss`: terms of its receivers."""
     folder = source.with_name(f"{source.name}-{way}")
     shutil.copytree(source, folder)
     for name in (VISIBILITY_FILE, BOUNCES_FILE):
@@ -57,7 +57,9 @@ def traced(source: Path, way: str, side: int) -> tuple[Capture, dict[str, float]
         told[what.split(",")[0]] = time.perf_counter() - began
 
     cubemap = CubemapSet(side)
-    keys = trace_cubemap(bare, found.surfels, found.bounces, "bench", Cubemap(cubemap.side), way, (0, 0), 77, progress, lambda line: None)
+    keys = trace_cubemap(
+        bare, found.surfels, found.bounces, "bench", Cubemap(cubemap.side), way, (0, 0), 77, progress, lambda line: None, gloss
+    )
     wall = time.perf_counter() - began
     stages = [stored_arrays(folder / name) for name in (VISIBILITY_FILE, BOUNCES_FILE)]
     direct, bounces = (stage for stage in stages if stage is not None)

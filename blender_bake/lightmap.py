@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import materials, precision, sample_spread, soundness, unwrap, world_normals
+from blender_bake import lobes, materials, precision, sample_spread, soundness, unwrap, world_normals
 from blender_bake.channels import chosen
 from blender_bake.ipc import Events, WorkerError
 from blender_bake.receiver_objects import prepare, select
@@ -95,7 +95,10 @@ class LightmapReceiver:
         return {"footprint": 0.5 if bpy.app.version < (5, 0) else 1.0}
 
     def channels(self, names: list[str]) -> dict[str, np.ndarray]:
-        """Those named of `position` (at texel centers), `normal`, `albedo`, `coverage`, masks `hit` and `valid`, `seams` (1, E, 8)."""
+        """Those named of `position` (at texel centers), `normal`, `albedo`, `coverage`, masks `hit` and `valid`, `seams` (1, E, 8).
+
+        Where gloss is kept: `glossy`, what it reflects of light along the normal, and `lobe`, its shape.
+        """
         makers = {
             "position": self._position,
             "normal": self._normal,
@@ -104,8 +107,15 @@ class LightmapReceiver:
             "hit": lambda: self._coverage,
             "valid": lambda: self._valid,
             "seams": self._seams,
+            "glossy": lambda: self._bake("GLOSSY", self._objects, 1, 0, pass_filter={"COLOR"})[:, :, :3] * self._coverage,
+            "lobe": self._lobe,
         }
         return chosen(names, makers, self.kind)
+
+    def _lobe(self) -> np.ndarray:
+        """(roughness, share of the lobe with a Fresnel term, 1 where there is any)."""
+        with lobes.emitted(slot.material for obj in self._objects for slot in obj.material_slots):
+            return lobes.of_sums(self._bake("EMIT", self._objects, 1, 0)[:, :, :3] * self._coverage)
 
     def _position(self) -> np.ndarray:
         return self._bake("POSITION", self._objects, 1, 0)[:, :, :3] * self._coverage  # one sample lies at the texel's center

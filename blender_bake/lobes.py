@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import bpy
+import numpy as np
 
 AOV = "srbf_lobe"  # (weight x roughness, weight x share with a Fresnel term, weight)
 DIELECTRIC = 0.08  # weight of the lobe of a Principled surface that is no metal, beside 1 of a metal
@@ -34,21 +36,58 @@ def add(layer: bpy.types.ViewLayer) -> None:
     """Make every material write AOV, and the layer have it as a pass; materials without nodes or gloss write 0."""
     made = layer.aovs.add()
     made.name, made.type = AOV, "COLOR"
+    for tree, _, color in _colors(bpy.data.materials):
+        if color is None:
+            continue
+        shown = tree.nodes.new("ShaderNodeOutputAOV")
+        shown.aov_name = AOV
+        tree.links.new(color, shown.inputs["Color"])
+
+
+@contextmanager
+def emitted(materials: Iterable[bpy.types.Material]) -> Iterator[None]:
+    """Inside, materials with nodes emit what AOV would hold, and reflect nothing; those without gloss emit 0."""
+    before = []
+    for tree, surface, color in _colors(dict.fromkeys(materials)):
+        before.append((tree, surface, surface.links[0].from_socket if surface.links else None))
+        shown = tree.nodes.new("ShaderNodeEmission")
+        shown.inputs["Color"].default_value = (0, 0, 0, 1)
+        if color is not None:
+            tree.links.new(color, shown.inputs["Color"])
+        tree.links.new(shown.outputs[0], surface)
+    try:
+        yield
+    finally:
+        for tree, surface, source in before:
+            tree.nodes.remove(surface.links[0].from_node)
+            if source is not None:
+                tree.links.new(source, surface)
+
+
+def of_sums(sums: np.ndarray) -> np.ndarray:
+    """(roughness, share of the lobe with a Fresnel term, 1 where there is any) of AOV, whose last axis is (.., .., weight)."""
+    weight = sums[..., 2:]
+    return np.where(weight > 0, sums / np.where(weight > 0, weight, 1), 0).astype(np.float32)
+
+
+def _colors(
+    materials: Iterable[bpy.types.Material],
+) -> Iterator[tuple[bpy.types.NodeTree, bpy.types.NodeSocket, bpy.types.NodeSocket | None]]:
+    """(node tree, the input that shows its surface, a socket of its `Lobe`, None without gloss) of every material with nodes in use."""
     groups: dict[str, Lobe] = {}
-    for material in bpy.data.materials:
-        tree = material.node_tree if material.use_nodes and material.users else None
+    for material in materials:
+        tree = material.node_tree if material is not None and material.use_nodes and material.users else None
         output = tree.get_output_node("CYCLES") if tree is not None else None
         if tree is None or output is None:
             continue
         found = _of_input(tree, output.inputs["Surface"], groups)
         if found.weight == 0.0:
+            yield tree, output.inputs["Surface"], None
             continue
         color = tree.nodes.new("ShaderNodeCombineXYZ")
         for target, value in zip(color.inputs, found.parts, strict=True):
             _put(tree, value, target)
-        shown = tree.nodes.new("ShaderNodeOutputAOV")
-        shown.aov_name = AOV
-        tree.links.new(color.outputs[0], shown.inputs["Color"])
+        yield tree, output.inputs["Surface"], color.outputs[0]
 
 
 def is_layered(material: bpy.types.Material | None) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import materials, precision, soundness, world_normals
+from blender_bake import lobes, materials, precision, soundness, world_normals
 from blender_bake.channels import chosen
 from blender_bake.ipc import Events, WorkerError
 from blender_bake.receiver_objects import prepare, select
@@ -100,7 +100,10 @@ class VertexReceiver:
         return {}
 
     def channels(self, names: list[str]) -> dict[str, np.ndarray]:
-        """Those named of `position`, `normal` (as the mesh has them), `albedo`, `coverage` and the masks `hit` and `valid`."""
+        """Those named of `position`, `normal` (as the mesh has them), `albedo`, `coverage` and the masks `hit` and `valid`.
+
+        Where gloss is kept: `glossy`, what it reflects of light along the normal, and `lobe`, its shape.
+        """
         faced = (np.bincount(self._corners, minlength=self._count) > 0)[:, None]
         makers = {
             "position": lambda: self._image(self._position() * faced),
@@ -110,8 +113,15 @@ class VertexReceiver:
             "hit": lambda: self._image(faced),
             "valid": lambda: self._image((np.bincount(self._corners, self._valid, self._count) > 0)[:, None]),
             "seams": lambda: None,
+            "glossy": lambda: self._image(self._of_vertices(self._bake("GLOSSY", 1, 0, pass_filter={"COLOR"}))),
+            "lobe": lambda: self._image(self._lobe()),
         }
         return chosen(names, makers, self.kind)
+
+    def _lobe(self) -> np.ndarray:
+        """(roughness, share of the lobe with a Fresnel term, 1 where there is any)."""
+        with lobes.emitted(slot.material for slot in self._object.material_slots):
+            return lobes.of_sums(self._of_vertices(self._bake("EMIT", 1, 0)))
 
     def _position(self) -> np.ndarray:
         points = np.empty(self._count * 3, np.float32)

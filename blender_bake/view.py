@@ -125,9 +125,7 @@ class ViewReceiver:
 
     def _lobe(self) -> np.ndarray:
         """(roughness, share of the lobe with a Fresnel term, 1 where there is any)."""
-        sums = self._materials()[lobes.AOV][:, :, :3]
-        weight = sums[:, :, 2:]
-        return np.where(weight > 0, sums / np.where(weight > 0, weight, 1), 0).astype(np.float32)
+        return lobes.of_sums(self._materials()[lobes.AOV][:, :, :3])
 
     def _transmission(self) -> np.ndarray | None:
         """The diffuse color of whole materials less that of their reflection; None where no material lets light through."""

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 MANIFEST = ASSET_MANIFEST
 GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo", *GLOSS, THROUGH)
-AT_TEXELS = ("normal", "albedo", "glossy", THROUGH)  # what relighting of some texels needs
+AT_TEXELS = ("normal", "albedo", *GLOSS, THROUGH)  # what relighting of some texels needs
 SCENE_FILE = "scene.glb"
 
 

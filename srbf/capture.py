@@ -100,7 +100,9 @@ class Capture(LightImages):
         for name in [*named, *(manifest[key] for key in ("scene", "seams") if key in manifest)]:
             files.inside(folder, name, path)
         if "cubemap" in manifest:
-            files.inside(folder, manifest["cubemap"]["bounces"], path)
+            for key in ("bounces", "tested"):
+                if key in manifest["cubemap"]:
+                    files.inside(folder, manifest["cubemap"][key], path)
             return CubemapCapture(folder, manifest, tuple(lights))
         return Capture(folder, manifest, tuple(lights))
 
@@ -242,6 +244,12 @@ class Capture(LightImages):
     def gloss(self) -> int | None:
         """Order of the spherical harmonics of the viewer's direction; None where radiance was captured toward one viewer alone."""
         return self.manifest["harmonics"]["order"] if "harmonics" in self.manifest else None
+
+    @property
+    def gloss_terms(self) -> int | None:
+        """How many terms of its receivers' gloss a bake under a cubemap was asked for; None where it knows no gloss."""
+        gloss = self.manifest.get("cubemap", {}).get("gloss")
+        return None if gloss is None else int(gloss["terms"])
 
     def of_harmonics(self) -> Capture:
         """A capture whose lights are the harmonics of this one's, light by light, K of each: T of K L columns."""

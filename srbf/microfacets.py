@@ -103,6 +103,36 @@ def reflected(
     return (lobe(NoL, NoV, NoH, np.hypot(alpha, spread / 2)) / whole)[:, None] * fresnel(VoH, color, share, grazing)
 
 
+def ends_of(
+    color: Float[ndarray, "n 3"], share: Float[ndarray, " n"], alpha: Float64[ndarray, " n"]
+) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
+    """(reflectance along the normal, at grazing) that lobes of whole albedo `color` toward a viewer above them have by `fresnel`."""
+    _, part = albedo_terms(np.ones(len(alpha)), alpha)
+    whole, share, part = np.asarray(color, np.float64), np.asarray(share, np.float64)[:, None], part[:, None]
+    normal = np.clip((whole - part) / np.maximum(1 - part, 1e-6), 0, 1)
+    scale = whole * share / np.maximum(normal * (1 - part) + part, 1e-9)
+    return whole * (1 - share) + normal * scale, whole * (1 - share) + scale
+
+
+def parts_of(
+    NoL: Float[ndarray, " n"],
+    NoV: Float[ndarray, " n"],
+    VoL: Float[ndarray, " n"],
+    alpha: Float64[ndarray, " n"],
+    whole: Float64[ndarray, " n"] | None = None,
+) -> tuple[Float64[ndarray, " n"], Float64[ndarray, " n"]]:
+    """f NoL of lobes by the cosines between normal, light and viewer, per unit of the two reflectances of `ends_of`: (along, grazing).
+
+    `whole`: the first of `albedo_terms`, where it is known.
+    """
+    NoV = np.maximum(NoV, 1e-3)
+    length = np.sqrt(np.maximum(2 + 2 * VoL, 1e-12))
+    whole = albedo_terms(NoV, alpha)[0] if whole is None else whole
+    even = lobe(NoL, NoV, np.minimum((NoL + NoV) / length, 1), alpha) / whole
+    grazing = even * schlick(np.minimum((1 + VoL) / length, 1))
+    return even - grazing, grazing
+
+
 def albedo_table() -> Float32[ndarray, "T T 2"]:
     """The table of `albedo_terms`, for `glsl/gloss/lobe_albedo.glsl`: rows by cosine, columns by roughness, the two terms."""
     return _table()[1].astype(np.float32)

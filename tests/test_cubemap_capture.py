@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from closed_forms import ball
+from made_cubemaps import HEIGHT, SIDE, WIDTH, made
 
 from srbf.asset import Asset
 from srbf.capture import Capture
@@ -18,62 +18,10 @@ from srbf.errors import ImageError, ManifestError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import fit
 from srbf.info import describe
-from srbf.io import files
-from srbf.io.image import write_image
 from srbf.lights import DirectionalLight
 from srbf.methods import linear_response
-from srbf.visibility.element_tracer import ElementTracer
-from srbf.visibility.embree import EmbreeTriangles
 
 pytest.importorskip("embreex")
-
-WIDTH, HEIGHT, SIDE = 24, 20, 8
-RANK = 2
-
-
-def made(folder: Path, transport: str = "combined", quantity: str = "irradiance", uncovered: int = 7, rank: int = RANK) -> Capture:
-    """A ground of WIDTH x HEIGHT places below a ball, the last few texels empty; bounces of made-up shapes; two lights that test."""
-    rng = np.random.default_rng(4)
-    cubemap = Cubemap(SIDE)
-    x, y = np.meshgrid(np.linspace(-1, 1, WIDTH), np.linspace(1, -1, HEIGHT))
-    position = np.stack([x, y, np.zeros_like(x)], axis=2).astype(np.float32)
-    coverage = np.ones(WIDTH * HEIGHT, np.float32)
-    coverage[len(coverage) - uncovered :] = 0
-    receivers = np.flatnonzero(coverage)
-    normals = np.tile(np.array([0, 0, 1], np.float32), (len(receivers), 1))
-    starts = position.reshape(-1, 3)[receivers] + np.array([0, 0, 1e-4], np.float32)
-    tracer = ElementTracer(
-        starts, normals, cubemap.directions.astype(np.float32), EmbreeTriangles(ball(0.4, [0, 0, 0.6]).astype(np.float32))
-    )
-    (folder / "lights").mkdir(parents=True)
-    write_arrays(folder / VISIBILITY_FILE, "made", bits=tracer.all_seen(), receivers=receivers.astype(np.int32), normals=normals)
-    shapes, weights = rng.random((len(receivers), rank), np.float32), 0.1 * rng.random((rank, cubemap.count, 3), np.float32)
-    write_arrays(folder / BOUNCES_FILE, "made", shapes=shapes, weights=weights)
-    for name, image in (
-        ("position", position),
-        ("coverage", coverage.reshape(HEIGHT, WIDTH, 1)),
-        ("albedo", rng.random((HEIGHT, WIDTH, 3), np.float32)),
-    ):
-        write_image(folder / f"{name}.exr", image, "float")
-    lights = []
-    for i in range(2):
-        image = rng.random((HEIGHT, WIDTH, 3), np.float32)
-        write_image(folder / f"lights/{i:04d}.exr", image, "float")
-        direct = {"direct": f"lights/{i:04d}.exr"} if transport == "indirect" else {}
-        lights.append({"kind": "directional", "direction": [0, 0, 1], "role": "holdout", "file": f"lights/{i:04d}.exr", **direct})
-    manifest = {
-        "format": "srbf-capture",
-        "version": 1,
-        "quantity": quantity,
-        "transport": transport,
-        "width": WIDTH,
-        "height": HEIGHT,
-        "lights": lights,
-        "cubemap": {"side": SIDE, "visibility": VISIBILITY_FILE, "bounces": BOUNCES_FILE},
-        **{name: f"{name}.exr" for name in ("position", "coverage", "albedo")},
-    }
-    files.write_json(folder / "capture.json", manifest)
-    return Capture.open(folder)
 
 
 @pytest.fixture

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A figure on a ground of 29,241 vertices, as all-frequency transport is measured on: `python figure.py NAME OUT.blend`.
+"""A figure on a ground of 29,241 vertices, as all-frequency transport is measured on: `python figure.py NAME OUT.blend [ROUGHNESS]`.
 
 `head` (7,958 vertices), `stone` (a bumpy ball of 10,242), `large` (the head with 31,658) and `bench` (seats of thin slats, and posts).
-The objects are called Figure and Ground; both are diffuse.
+The objects are called Figure and Ground; both are diffuse, with a ROUGHNESS glossy: the figure a coat of plastic with half as much
+metal, the ground plastic.
 """
 
 from __future__ import annotations
@@ -25,6 +26,15 @@ def diffuse(name, color):
     node = nodes.new("ShaderNodeBsdfDiffuse")
     node.inputs["Color"].default_value = (*color, 1)
     made.node_tree.links.new(node.outputs["BSDF"], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return made
+
+
+def glossy(name, color, roughness, metallic):
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    node = made.node_tree.nodes["Principled BSDF"]
+    for key, value in (("Base Color", (*color, 1)), ("Roughness", roughness), ("Metallic", metallic)):
+        node.inputs[key].default_value = value
     return made
 
 
@@ -107,20 +117,25 @@ def bench():
 FIGURES = {"head": head, "stone": stone, "large": large, "bench": bench}
 
 
+def shown(name, color, roughness, metallic):
+    return diffuse(name, color) if roughness is None else glossy(name, color, roughness, metallic)
+
+
 def main():
     """Build the scene that the command line names."""
-    if len(sys.argv) != 3 or sys.argv[1] not in FIGURES or not sys.argv[2].endswith(".blend"):
-        print(f"usage: python data/scenes/figure.py {'|'.join(FIGURES)} OUT.blend", file=sys.stderr)
+    if len(sys.argv) not in (3, 4) or sys.argv[1] not in FIGURES or not sys.argv[2].endswith(".blend"):
+        print(f"usage: python data/scenes/figure.py {'|'.join(FIGURES)} OUT.blend [ROUGHNESS]", file=sys.stderr)
         return 2
+    roughness = float(sys.argv[3]) if len(sys.argv) > 3 else None
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=SIDE, y_subdivisions=SIDE, size=4)
     ground = bpy.context.object
     ground.name = "Ground"
-    ground.data.materials.append(diffuse("Ground", (0.6, 0.6, 0.6)))
+    ground.data.materials.append(shown("Ground", (0.6, 0.6, 0.6), roughness, 0))
     figure = FIGURES[sys.argv[1]]()
     figure.name = "Figure"
     figure.data.materials.clear()
-    figure.data.materials.append(diffuse("Figure", (0.7, 0.45, 0.3)))
+    figure.data.materials.append(shown("Figure", (0.7, 0.45, 0.3), roughness, 0.5))
     add_camera((3.2, -4.2, 2.6), (0, 0, 0.4), 50)
     cycles = start_cycles(bpy.context.scene)
     cycles.max_bounces = cycles.diffuse_bounces = 4

@@ -73,7 +73,7 @@ class FirstLights:
 def bytes_needed(settings: BakeSettings, lights: float, summed: float) -> int:
     """Bytes of an uncompressed capture of `lights` lights, `summed` of which keep their running sums; one with a share counts as such."""
     texels = settings.width * settings.height
-    images = (2 if settings.transport == "indirect" else 1) + (0 if settings.gloss is None else (settings.gloss + 1) ** 2)
+    images = (2 if settings.transport == "indirect" else 1) + (0 if settings.harmonics is None else (settings.harmonics + 1) ** 2)
     sums = images + 1  # validation lights have their squares
     return round(texels * (lights * images * 3 * HALF_BYTES + summed * sums * 3 * FLOAT_BYTES + GEOMETRY_CHANNELS * FLOAT_BYTES))
 

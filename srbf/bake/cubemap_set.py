@@ -105,16 +105,17 @@ class CubemapSet:
         seed: int,
         progress: Callable[[int, int, str], None],
         say: Callable[[str], None],
+        gloss: int | None = None,
     ) -> dict[str, Any]:
         """All that the capture holds of its lights, into the folder of `receivers`; stages that are there already are kept.
 
-        `roles`: how many lights validate and are held out. Returns keys of capture.json.
+        `roles`: how many lights validate and are held out. `gloss`: terms of the receivers' gloss, if any. Returns keys of capture.json.
         """
         found = self.surfels.found
         if found is None or found.surfels is None:
             raise InputError("expected the surfels of a known scene, found none; call with_light_set first")
         return trace_cubemap(
-            receivers, found.surfels, found.bounces, found.checksum, Cubemap(self.side), self.sampling, roles, seed, progress, say
+            receivers, found.surfels, found.bounces, found.checksum, Cubemap(self.side), self.sampling, roles, seed, progress, say, gloss
         )
 
 

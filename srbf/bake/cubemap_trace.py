@@ -15,11 +15,13 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.bake.surface_checks import warn_of_duplicates, warn_of_unlit
 from srbf.capture import Capture
+from srbf.channels import GLOSS
 from srbf.cubemap import Cubemap
-from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE, stored_arrays, write_arrays
+from srbf.cubemap_transport import BOUNCES_FILE, TESTED_FILE, VISIBILITY_FILE, stored_arrays, write_arrays
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.io.image import write_image
+from srbf.receiver_gloss import LEAST, ReceiverGloss
 from srbf.receiver_images import MANIFEST
 from srbf.sphere import random_directions
 from srbf.visibility.distant_bounces import DistantBounces, Effort, Mixture, light_on_surfels, traced
@@ -80,6 +82,7 @@ class _Stages:
     key: str
     progress: Progress
     say: Callable[[str], None]
+    gloss: int | None
 
     @cached_property
     def receivers(self) -> Receivers:
@@ -106,6 +109,8 @@ class _Stages:
         names = [repr(one["object"]) for one in self.described]
         what = names[0] if len(names) == 1 else f"{len(names)} objects"
         warn_of_unlit(is_lit, what, self.say)
+        if self.gloss is not None and not (self.lobes.strength > LEAST).any():
+            self.say(f"nothing of {what} is glossy: it looks the same from everywhere")
         if not self.is_lightmap:
             warn_of_duplicates(self.points.starts, self.points.normals, what, self.say)
 
@@ -173,11 +178,13 @@ class _Stages:
                 effort,
                 self.seed,
                 lambda done, total: self.progress(done, total, "bounces"),
+                self.gloss is not None,
             )
         arrays: dict[str, ndarray] = {
             "shapes": bounces.shapes.astype(np.float16),
             "weights": bounces.weights.astype(np.float16),
             "from_surfels": mixture.transfer.astype(np.float16),
+            **({} if bounces.harmonics is None else {"harmonics": bounces.harmonics.astype(np.float16)}),
             "rays": np.array(bounces.rays),
             "cpu_seconds": np.array(time.process_time() - began),
         }
@@ -202,26 +209,54 @@ class _Stages:
             for i, entry in enumerate(entries)
             if not all((self.capture.folder / entry[k]).is_file() for k in ("file", "direct") if k in entry)
         ]
+        unknown = self.gloss is not None and stored_arrays(self.capture.folder / TESTED_FILE, self.key) is None
+        if unknown:
+            missing = list(range(len(entries)))
         if missing:
             tracer = self.tracer(directions[missing])
-            seen = np.unpackbits(tracer.all_seen(), axis=1, count=len(missing))
+            bits = tracer.all_seen()
+            seen = np.unpackbits(bits, axis=1, count=len(missing))
             direct = seen * np.maximum(tracer.normals @ tracer.directions.T, 0)
             lit = light_on_surfels(self.surfels, directions[missing], self.occluders)[0]
             transfer = bounces["from_surfels"].astype(np.float32)
             weights = np.stack([transfer[:, :, c] @ lit for c in range(3)], axis=2)
             shapes = bounces["shapes"].astype(np.float32)
+            if unknown:
+                write_arrays(self.capture.folder / TESTED_FILE, self.key, bits=bits, weights=weights.transpose(1, 0, 2))
+            straight_up = None
+            if self.gloss is not None and "harmonics" in bounces:
+                straight_up = self.lobes.of_bounces(self.points.normals)  # (R, K, 3)
             for number, i in enumerate(missing):
-                self._write_tested(entries[i], direct[:, number], shapes @ weights[:, number])
+                gloss = 0.0
+                if straight_up is not None:
+                    gloss = np.einsum(
+                        "krj,jc,rkc->rc", bounces["harmonics"].astype(np.float32), weights[:, number], straight_up, optimize=True
+                    )
+                self._write_tested(entries[i], direct[:, number], shapes @ weights[:, number], gloss)
                 self.progress(number + 1, len(missing), "lights that test")
         return entries
 
-    def _write_tested(self, entry: dict[str, Any], direct: Float32[ndarray, " R"], reflected: Float32[ndarray, "R 3"]) -> None:
+    def _write_tested(
+        self, entry: dict[str, Any], direct: Float32[ndarray, " R"], reflected: Float32[ndarray, "R 3"], gloss: ndarray | float
+    ) -> None:
+        """`gloss`: radiance of what lobes reflect of bounces."""
         white = np.repeat(direct[:, None], 3, axis=1).astype(np.float32)
         if "direct" in entry:
             write_image(self.capture.folder / entry["direct"], self._image(white), "half")
         else:
             reflected = reflected + white
-        write_image(self.capture.folder / entry["file"], self._image(reflected), "half")
+        image = self._image(reflected)
+        if self.gloss is not None:
+            lit = np.flatnonzero(direct > 0)
+            image.reshape(-1, 3)[self.points.texels] += gloss
+            image.reshape(-1, 3)[self.points.texels[lit]] += self.lobes.from_above(lit, direct[lit].astype(np.float64))
+        write_image(self.capture.folder / entry["file"], image, "half")
+
+    @cached_property
+    def lobes(self) -> ReceiverGloss:
+        """Of the points."""
+        glossy, lobe = (self.receivers.images[name].reshape(-1, 3)[self.points.texels] for name in GLOSS)
+        return ReceiverGloss.of(glossy, lobe, self.points.normals)
 
     def _image(self, irradiance: Float32[ndarray, "R 3"]) -> Float32[ndarray, "H W 3"]:
         """In the capture's quantity; 0 where there is no receiver."""
@@ -241,13 +276,15 @@ def trace_cubemap(
     seed: int,
     progress: Progress,
     say: Callable[[str], None],
+    gloss: int | None = None,
 ) -> dict[str, Any]:
     """The files of a capture under `cubemap` into the folder of `capture`, which has no lights; the keys of its manifest.
 
-    `checksum`: of what is known of the scene. `roles`: how many lights validate and are held out.
+    `checksum`: of what is known of the scene. `roles`: how many lights validate and are held out. `gloss`: how many terms its receivers'
+    gloss shall have; they cost no ray.
     """
-    key = f"{checksum} {capture.width}x{capture.height} {cubemap.side} {sampling} {seed}"
-    stages = _Stages(capture, surfels, bounces, cubemap, sampling, seed, key, progress, say)
+    key = f"{checksum} {capture.width}x{capture.height} {cubemap.side} {sampling} {seed}{'' if gloss is None else ' gloss'}"
+    stages = _Stages(capture, surfels, bounces, cubemap, sampling, seed, key, progress, say, gloss)
     visibility = stages.visibility()
     chosen = str(visibility["sampling"])
     reflected = stages.reflected(chosen)
@@ -265,7 +302,11 @@ def trace_cubemap(
         "rays": rays,
         "sampled": sampled,
     }
-    return {"cubemap": told if chosen == "full" else {**told, "predicted_error": error}, "lights": entries}
+    if chosen != "full":
+        told["predicted_error"] = error
+    if gloss is not None:
+        told |= {"gloss": {"terms": gloss}, **({"tested": TESTED_FILE} if entries else {})}
+    return {"cubemap": told, "lights": entries}
 
 
 def totals(folders: Sequence[Path]) -> dict[str, Any] | None:

@@ -18,7 +18,7 @@ from srbf.bake.images import PREPARED, SCENE_FILE, SEAMS
 from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE
 from srbf.bake.shard import Shard
 from srbf.channels import CHANNELS, file_name
-from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE
+from srbf.cubemap_transport import BOUNCES_FILE, TESTED_FILE, VISIBILITY_FILE
 from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
@@ -44,6 +44,7 @@ BEFORE_IMAGES = (
     OPERATOR_FILE,
     VISIBILITY_FILE,
     BOUNCES_FILE,
+    TESTED_FILE,
     "lights",
     "direct",
     "harmonics",
@@ -61,6 +62,7 @@ WRITTEN = (
     OPERATOR_FILE,
     VISIBILITY_FILE,
     BOUNCES_FILE,
+    TESTED_FILE,
     ACCUMULATION,
     FORMER,
     SCRATCH,

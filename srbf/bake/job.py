@@ -33,7 +33,7 @@ def serving_job(scene: Path, settings: BakeSettings, prepared: dict[str, Any] | 
     return {
         **base_job(scene, settings, scratch),
         "serve": True,
-        "channels": [*ASKED_FOR, *((*GLOSS, THROUGH) if _keeps_gloss(settings) else ())] if first else [],
+        "channels": [*ASKED_FOR, *_gloss_channels(settings)] if first else [],
         "ambient": RenderRequest(None, settings.holdout_samples, noise_seed(settings.seed, AMBIENT_SEED)).message() if shines else None,
         "probes": [light.json() for light in probes],
         "transmittances": None if prepared is None else prepared["transmittances"],
@@ -71,10 +71,17 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Seque
         "channels": [],
         "ambient": None,
         "probes": [],
-        "viewers": None if settings.gloss is None else viewer_directions(settings.gloss).tolist(),
+        "viewers": None if settings.harmonics is None else viewer_directions(settings.harmonics).tolist(),
         "transmittances": None,
         "requests": [request.message() for request in requests],
     }
+
+
+def _gloss_channels(settings: BakeSettings) -> tuple[str, ...]:
+    """What is asked of the receivers' gloss."""
+    if _keeps_gloss(settings):
+        return (*GLOSS, THROUGH)
+    return GLOSS if settings.gloss is not None and settings.harmonics is None else ()
 
 
 def _keeps_gloss(settings: BakeSettings) -> bool:

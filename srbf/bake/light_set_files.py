@@ -57,7 +57,7 @@ def trace_operator(
     """
     light_set = settings.light_set
     if isinstance(light_set, CubemapSet):
-        return light_set.trace(receivers, (settings.validation, settings.holdout), settings.seed, progress, say)
+        return light_set.trace(receivers, (settings.validation, settings.holdout), settings.seed, progress, say, settings.gloss)
     if isinstance(light_set, GatherSet):
         light_set.trace(receivers, settings.seed, progress, say)
     if not isinstance(light_set, CloudSet) or light_set.found is None or light_set.found.surfels is None:

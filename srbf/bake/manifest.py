@@ -65,7 +65,7 @@ def capture_manifest(
             for light, samples, noise in lights
         ],
         **({"scene": SCENE_FILE, "direct": {"sun_angle": sun_angle, **prepared["sampling"]}} if apart else {}),
-        **({} if settings.gloss is None else {"harmonics": {"order": settings.gloss}}),
+        **({} if settings.harmonics is None else {"harmonics": {"order": settings.harmonics}}),
         **manifest_keys(prepared["channels"]),
         **known,
         **({SEAMS: file_name(SEAMS)} if prepared["seams"] else {}),

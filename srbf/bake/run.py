@@ -167,7 +167,7 @@ class Bake:
                     return False
                 folder.sweep(self.folder)
                 apart = ["direct"] if self.settings.transport == "indirect" else []
-                for name in (ACCUMULATION, "lights", *apart, *([] if self.settings.gloss is None else ["harmonics"])):
+                for name in (ACCUMULATION, "lights", *apart, *([] if self.settings.harmonics is None else ["harmonics"])):
                     files.make_folder(self.folder / name)
                 files.make_folder(self.folder / SCRATCH)
                 _Passes(self, identity, reporter, shard).run()

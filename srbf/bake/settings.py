@@ -17,6 +17,7 @@ from srbf.bake.light_sets import CloudSet, NamedSet, PlacedLight
 from srbf.bake.planned_lights import PlannedLight, Rendered, noise_seed
 from srbf.bake.point_lights import PointGrid
 from srbf.basis.exitant_harmonics import MAX_ORDER
+from srbf.brdf_factors import check_terms
 from srbf.captured_light import ROLES, Role
 from srbf.errors import InputError
 from srbf.importing.light_list import read_light_list
@@ -234,7 +235,8 @@ class BakeSettings:
     scene
         One of the .blend's scenes; None: the active one.
     gloss
-        Order of the spherical harmonics that hold the radiance toward every viewer, 1 to 4; None: the radiance toward one alone.
+        The radiance toward every viewer, too: of a cloud the order of its spherical harmonics, 1 to 4; under a cubemap the terms of the
+        BRDF's in-out factorization, 1 to 64. None: the radiance toward one alone.
     step
         Of a train light's share: every n-th texel across and down, another set for the next light; 1 to 8, 1: all texels.
 
@@ -274,7 +276,7 @@ class BakeSettings:
     no_shadow: tuple[str, ...] = ()  # objects that cast no shadow
     denoise: bool = False  # of a view's train images
     scene: str | None = None  # of the .blend's scenes; None: the active one
-    gloss: int | None = None  # order of the harmonics of the viewer's direction
+    gloss: int | None = None  # order of the harmonics of the viewer's direction, or terms of an in-out factorization
     step: int = 1  # texels from one to the next of a train light's share
 
     def __post_init__(self) -> None:
@@ -359,15 +361,24 @@ class BakeSettings:
         if min(self.width, self.height) < self.step:
             raise InputError(f"expected {self.step} texels or more each way with {what}, found {self.width}x{self.height}")
 
-    def _check_gloss(self, order: int) -> None:
-        if not 1 <= order <= MAX_ORDER:
-            raise InputError(f"expected `gloss` of order 1 to {MAX_ORDER}, found {order}")
-        if self.light_set is None or self.light_set.kind != "cloud":
-            found = "others" if self.light_set is None else self.light_set.kind
-            raise InputError(f"expected `light_set=cloud` with `gloss`, found {found}; leave `gloss` out")
+    def _check_gloss(self, gloss: int) -> None:
+        kind = None if self.light_set is None else self.light_set.kind
+        if kind not in ("cloud", "cubemap"):
+            raise InputError(f"expected `light_set=cloud` or cubemap:SIDE with `gloss`, found {kind or 'others'}; leave `gloss` out")
+        if kind == "cubemap":
+            check_terms(gloss)
+        elif not 1 <= gloss <= MAX_ORDER:
+            raise InputError(f"expected `gloss` of order 1 to {MAX_ORDER}, found {gloss}")
+        if kind == "cubemap" and self.transport != "combined":
+            raise InputError("expected `transport=combined` with `gloss` under a cubemap, found indirect; leave `transport` out")
         if self.receiver.kind == "view" or self.quantity != "radiance":
             found = "a view, which has one viewer" if self.receiver.kind == "view" else "irradiance, which no viewer changes"
             raise InputError(f"expected the radiance of a lightmap or of vertices with `gloss`, found {found}")
+
+    @property
+    def harmonics(self) -> int | None:
+        """Order of the spherical harmonics of the viewer's direction that lights are rendered toward; None without."""
+        return self.gloss if self.light_set is not None and self.light_set.kind == "cloud" else None
 
     def with_matched_sun(self) -> BakeSettings:
         """The settings with a sun angle of the train lights' mean spacing: penumbrae as soft as that many lights can resolve.
@@ -441,7 +452,7 @@ def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
         random = (random_directions(count, domain, rng) for count in (settings.validation, settings.holdout))
         groups = (directions, *random)
         train, validation, holdout = ([PlacedLight("directional", tuple(place)) for place in group.tolist()] for group in groups)
-    if settings.gloss is not None:
+    if settings.harmonics is not None:
         parts = {role: (*own, "toward") for role, own in parts.items()}
     shares: list[Share | None] = [None] * len(train) if settings.step == 1 else [*shares_in_turn(len(train), settings.step)]
     planned: list[PlannedLight] = []
@@ -455,5 +466,5 @@ def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
             index = len(planned)
             share = shares[index] if role == "train" else None
             seed = noise_seed(settings.seed, index)
-            planned.append(PlannedLight(index, light, role, samples, seed, parts[role], settings.gloss, share))
+            planned.append(PlannedLight(index, light, role, samples, seed, parts[role], settings.harmonics, share))
     return planned

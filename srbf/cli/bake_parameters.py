@@ -232,7 +232,8 @@ Gloss = Annotated[
         "--gloss",
         metavar="ORDER",
         parser=COUNT,
-        help="cloud: for glossy surfaces, the radiance toward any viewer, as spherical harmonics of order 1 to 4 (3).",
+        help="For glossy surfaces, the radiance toward any viewer. cloud: as spherical harmonics of order 1 to 4 (3); cubemap: by so many "
+        "terms of the BRDF's in-out factorization, 1 to 64 (4), without further rays.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),

@@ -17,12 +17,14 @@ from srbf.cli.terminal import note, print_json, progress_bar
 from srbf.cli.values import COUNT, COUNT_OR_NONE
 from srbf.evaluation.environment_errors import environment_errors
 from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
+from srbf.evaluation.glossy_errors import glossy_errors
 from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
 from srbf.evaluation.random_mixes import mix_errors
 from srbf.evaluation.viewer_errors import viewer_errors, viewer_line
 from srbf.fitting.options import method_for
 from srbf.light_domain import domain_of_capture
 from srbf.methods.environment_table import has_environment_table
+from srbf.methods.glossy_eigen_map import GlossyEigenMap
 from srbf.relighting.direct_light import Added, chosen
 
 COMMAND = FitCommand
@@ -95,6 +97,8 @@ def evaluate(
         result["mixes"] = mix_errors(opened, images).as_dict()
     if "harmonics" in opened.manifest and images.gloss is not None:
         result["viewers"] = viewer_errors(opened, images)
+    if opened.method == GlossyEigenMap.name and images.gloss_terms is not None:
+        result["viewers"] = glossy_errors(opened, images)
     if has_environment_table(opened) and "surfels" in images.manifest:
         result["environments"] = environment_errors(opened, images)
     _print_errors(result, json)

@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float64
+from srbf.arrays import Float, Float64
 from srbf.basis.gaussian import weight
 from srbf.basis.light_functions import LightFunctions
 from srbf.sphere import mean_spacing
 
 SPREAD = 0.9  # of the directions' mean spacing: wide enough for no dips between them, narrow enough to be well-conditioned
 RIDGE = 0.02  # on the diagonal of the Gaussians' matrix, whose entries are 1 there: takes off what overshoots at shadow edges
+FUNCTIONS = 512  # solved at a time
 
 
-def functions_between(directions: Float64[ndarray, "N 3"], values: Float64[ndarray, "N F 3"]) -> tuple[LightFunctions, dict[str, Any]]:
+def functions_between(directions: Float64[ndarray, "N 3"], values: Float[ndarray, "N F 3"]) -> tuple[LightFunctions, dict[str, Any]]:
     """Smooth functions near `values` at dense `directions`, and the manifest's record of them.
 
     (R + ridge I) a = values, R_ij = exp(-angle_ij^2 / 2 spread^2) between the directions, which are the centers. Nothing is chosen: with a
@@ -28,7 +29,11 @@ def functions_between(directions: Float64[ndarray, "N 3"], values: Float64[ndarr
     spread = SPREAD * mean_spacing(directions)
     kernel = weight(directions @ directions.T, spread)
     kernel[np.diag_indices_from(kernel)] += RIDGE
-    solved = lu_solve(lu_factor(kernel, overwrite_a=True, check_finite=False), values.reshape(len(values), -1), check_finite=False)
-    coefficients = solved.reshape(values.shape).transpose(1, 0, 2).astype(np.float16).astype(np.float32)
+    factors = lu_factor(kernel, overwrite_a=True, check_finite=False)
+    coefficients = np.empty((values.shape[1], len(values), 3), np.float32)
+    for start in range(0, values.shape[1], FUNCTIONS):
+        part = values[:, start : start + FUNCTIONS]
+        solved = lu_solve(factors, part.reshape(len(values), -1).astype(np.float64), check_finite=False)
+        coefficients[start : start + FUNCTIONS] = solved.reshape(part.shape).transpose(1, 0, 2).astype(np.float16)
     functions = LightFunctions(directions, np.full(len(coefficients), spread), coefficients)
     return functions, {"kernel": {"narrow": float(spread)}, "ridge": RIDGE}

@@ -30,10 +30,10 @@ class LightSpace:
     row_weights: Float32[ndarray, " n"]
 
     @staticmethod
-    def of(sample: TexelSample, weighting: Weighting) -> LightSpace:
-        """Weights and mean of a sample's train lights."""
+    def of(sample: TexelSample, weighting: Weighting, angles: Float64[ndarray, " L"] | None = None) -> LightSpace:
+        """Weights and mean of a sample's train lights. `angles`: solid angles that they stand for, 1 in the mean, where these are known."""
         responses = sample.responses[:, : sample.train]
-        angles = sample.domain.quadrature(sample.coordinates[: sample.train])
+        angles = sample.domain.quadrature(sample.coordinates[: sample.train]) if angles is None else angles
         rows = np.ones(len(responses), np.float32)
         if weighting == "relative":
             own = np.abs(responses).mean(axis=(1, 2))

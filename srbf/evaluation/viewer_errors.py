@@ -93,4 +93,5 @@ def viewer_errors(
 
 def viewer_line(error: dict[str, Any]) -> str:
     """The errors of one role in words."""
-    return f"relative RMSE {error['relative_rmse']:.4f}, mean over lights {error['mean']:.4f}, worst light {error['worst']:.4f}"
+    alone = f"; of the factorization alone {error['factorization']:.4f}" if "factorization" in error else ""
+    return f"relative RMSE {error['relative_rmse']:.4f}, mean over lights {error['mean']:.4f}, worst light {error['worst']:.4f}{alone}"

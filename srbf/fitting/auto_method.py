@@ -20,6 +20,7 @@ from srbf.evaluation.errors_by_role import evaluate
 from srbf.evaluation.errors_by_role import psnr as psnr_of
 from srbf.light_domain import Directions, domain_of_capture
 from srbf.methods.clustered_eigen_map import LEAST_TEXELS, TRIED_CLUSTERS, ClusteredEigenMap
+from srbf.methods.glossy_eigen_map import GlossyEigenMap
 from srbf.methods.protocol import Method, check_error
 from srbf.registry import all_methods
 from srbf.solve.kernel_ridge import KernelPath
@@ -115,6 +116,8 @@ def _of_cubemap(capture: Capture, size: int, psnr: float | None, error: float | 
         other = "psnr" if error is None else "error"
         raise InputError(f"expected a `budget` for a capture under a cubemap, found `{other}`; or choose a method and its settings")
     numbers, texels = 3 * len(capture.indices("train")), int((capture.coverage() >= COVERED).sum())
+    if capture.gloss_terms is not None:
+        return GlossyEigenMap(components=max(1, (size - 1) // 4 * 4), clusters=int(np.clip(texels // LEAST_TEXELS, 1, CUBEMAP_CLUSTERS)))
     many = ClusteredEigenMap.candidates(size, max(texels, LEAST_TEXELS * TRIED_CLUSTERS[0]), numbers)
     clusters = int(np.clip(texels // LEAST_TEXELS, 1, CUBEMAP_CLUSTERS))
     first = next(iter(many), None)

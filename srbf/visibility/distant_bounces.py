@@ -9,12 +9,14 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
+from srbf.brdf_factors import BOUNCE_ORDER
 from srbf.cubemap import Cubemap
 from srbf.solve.radiosity import SERIES, Bounces, reciprocal
 from srbf.solve.sparse_rows import product
 from srbf.visibility.element_tracer import ElementTracer
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.form_factors import RayOrigins, form_factors
+from srbf.visibility.gathered_harmonics import gathered_harmonics
 from srbf.visibility.received import starts_of
 from srbf.visibility.surfels import Surfels
 from srbf.visibility.transfer_operator import POINTS, SURFEL_RAYS, leave_gaps_out, rays_of_each
@@ -49,12 +51,14 @@ class Effort:
 class DistantBounces:
     """Irradiance that surfels reflect to R receivers under a light of unit irradiance from each of N directions: shapes times weights.
 
-    E(p, l) = sum_j shapes[p, j] weights[j, l], by color. `rays`: traced to know it.
+    E(p, l) = sum_j shapes[p, j] weights[j, l], by color. `rays`: traced to know it. `harmonics`, for gloss: the same of what arrives times
+    each of K harmonics of where it comes from, see `gathered_harmonics`.
     """
 
     shapes: Float32[ndarray, "R r"]
     weights: Float32[ndarray, "r N 3"]
     rays: int
+    harmonics: Float32[ndarray, "K R r"] | None = None
 
     @staticmethod
     def none(receivers: int, directions: int) -> DistantBounces:
@@ -92,8 +96,10 @@ def traced(
     effort: Effort,
     seed: int = 0,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    gloss: bool = False,
 ) -> tuple[DistantBounces, Mixture]:
-    """Bounces at the receivers whose rays start at `origins`; `most_bounces`: reflections at most, None: all of them.
+    """Bounces at the receivers whose rays start at `origins`; `most_bounces`: reflections at most, None: all of them; `gloss`: with
+    `harmonics`, by the same rays.
 
     The shapes are the leading axes of what JUDGES receivers get from all directions: T = G K e, G their form factors, K the bounces, e the
     direct light on the surfels. With V (N, r) the right singular vectors, shapes = G K e V and weights = V^T, so that no product has S N S
@@ -125,9 +131,14 @@ def traced(
         return DistantBounces.none(count, cubemap.count), Mixture.none(surfels.count)
     mixture = np.sum([one.radiosity(np.asarray(lit @ v, np.float32)) for one, v in zip(bounces, right, strict=True)], axis=0)
     shapes = np.zeros((count, mixture.shape[1]), np.float32)
+    waves = np.zeros(((BOUNCE_ORDER + 1) ** 2, count, mixture.shape[1]), np.float32) if gloss else None
     for start in range(0, count, BLOCK):
         rows = np.arange(start, min(start + BLOCK, count))
-        shapes[rows] = product(form_factors(surfels, _at(origins, rows), per_point, seed + 3 + start), mixture)
+        if waves is None:
+            shapes[rows] = product(form_factors(surfels, _at(origins, rows), per_point, seed + 3 + start), mixture)
+        else:
+            waves[:, rows] = gathered_harmonics(surfels, _at(origins, rows), per_point, mixture.astype(np.float32), seed + 3 + start)
+            shapes[rows] = waves[0, rows] * np.float32(np.sqrt(4 * np.pi))
         progress(start + len(rows), count)
     rays += count * of_each * per_point
     weights = np.stack([v.T for v in right], axis=2)
@@ -139,7 +150,8 @@ def traced(
     of_judges = judged @ mixture
     inverse = np.linalg.pinv(of_judges.astype(np.float64), rcond=1e-4).astype(np.float32)
     transfer = np.stack([inverse @ own for own in gathered], axis=2)
-    return DistantBounces(shapes / scale, (scale * weights).astype(np.float32), rays), Mixture((scale * transfer).astype(np.float32))
+    waves = None if waves is None else waves / scale
+    return DistantBounces(shapes / scale, (scale * weights).astype(np.float32), rays, waves), Mixture((scale * transfer).astype(np.float32))
 
 
 def _leading(pictures: list[Float32[ndarray, "J N"]]) -> list[Float32[ndarray, "N r"]]:

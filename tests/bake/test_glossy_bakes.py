@@ -170,8 +170,8 @@ def test_settings_of_gloss() -> None:
     for changes, message in (
         ({"gloss": 5}, "expected `gloss` of order 1 to 4, found 5"),
         ({"gloss": 0}, "expected `gloss` of order 1 to 4, found 0"),
-        ({"light_set": None}, "expected `light_set=cloud` with `gloss`, found others"),
-        ({"light_set": NamedSet()}, "expected `light_set=cloud` with `gloss`, found named"),
+        ({"light_set": None}, "expected `light_set=cloud` or cubemap:SIDE with `gloss`, found others"),
+        ({"light_set": NamedSet()}, "expected `light_set=cloud` or cubemap:SIDE with `gloss`, found named"),
         ({"quantity": "irradiance"}, "found irradiance, which no viewer changes"),
         ({"receiver": Receiver("view")}, "found a view, which has one viewer"),
     ):

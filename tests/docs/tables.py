@@ -112,6 +112,7 @@ NOT_RUN = {
     "python benchmarks/web_environments.py *": "wants the page of the browser's tests, and an asset of a cubemap's directions",
     "srbf bake head.blend *": "37,000 vertices under 6144 directions: minutes; tests/bake/test_cubemap_bakes.py runs smaller ones",
     "srbf fit C/Figure *": "the same",
+    "python benchmarks/sparse_gloss.py *": "the same as sparse.py, with gloss: minutes",
     "python benchmarks/sparse.py *": "traces every element of a figure and its ground, three times over: minutes",
     "srbf bake large.blend *": "60,000 vertices under 6144 directions: minutes; tests/bake/test_cubemap_bakes.py runs smaller ones",
     "srbf bake loft.blend *": "form factors of thousands of probes: a minute at its smallest",

@@ -60,6 +60,7 @@ def test_methods_are_listed_from_the_simplest() -> None:
             "transfer",
             "deep-framebuffer",
             "gather-samples",
+            "glossy-eigen-map",
             "neural-map",
             "transfer-paper",
         ),

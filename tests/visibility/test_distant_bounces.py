@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from made_rooms import Room, divided
 
+from srbf.basis.exitant_harmonics import harmonics
+from srbf.brdf_factors import BOUNCE_ORDER
 from srbf.cubemap import Cubemap
+from srbf.receiver_gloss import framed
 from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.visibility.distant_bounces import Effort, light_on_surfels, traced
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.form_factors import RayOrigins, form_factors
+from srbf.visibility.gathered_harmonics import gathered_harmonics
+from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.surfels import Surfels, surfels_of
 
@@ -70,3 +75,19 @@ def test_a_seed_gives_the_same_again(surfels: Surfels) -> None:
     one, two = (traced(surfels, ORIGINS, CUBEMAP, OCCLUDERS, 2, Effort.sparse(), 9)[0] for _ in range(2))
     np.testing.assert_array_equal(one.shapes, two.shapes)
     np.testing.assert_array_equal(one.weights, two.weights)
+
+
+def test_gloss_adds_harmonics_of_the_same_rays(surfels: Surfels) -> None:
+    """The first is the shapes; all of them are means over rays that meet something, of even light."""
+    plain, _ = traced(surfels, ORIGINS, CUBEMAP, OCCLUDERS, 2, Effort.sparse(), 9)
+    glossy, _ = traced(surfels, ORIGINS, CUBEMAP, OCCLUDERS, 2, Effort.sparse(), 9, gloss=True)
+    assert plain.harmonics is None and glossy.harmonics is not None and glossy.rays == plain.rays
+    np.testing.assert_allclose(glossy.shapes, plain.shapes, rtol=1e-3, atol=1e-4 * np.abs(plain.shapes).max())
+    np.testing.assert_allclose(glossy.harmonics[0] * np.float32(np.sqrt(4 * np.pi)), glossy.shapes, rtol=1e-5, atol=1e-7)
+    ways, rays = cosine_directions(ORIGINS.normals[:3].astype(np.float64), 4096, np.random.default_rng(1))[:, 0], 4096
+    starts = np.repeat(ORIGINS.points[:3, 0], rays, axis=0)
+    met, _ = surfels.met_along(starts + 1e-4 * np.repeat(ORIGINS.normals[:3, 0], rays, axis=0), ways.reshape(-1, 3))
+    hit = (met >= 0).reshape(3, rays)
+    waves = harmonics(np.einsum("nij,ncj->nci", framed(ORIGINS.normals[:3, 0]), ways), BOUNCE_ORDER)
+    found = gathered_harmonics(surfels, ORIGINS, 2048, np.ones((surfels.count, 1), np.float32), 3)[:, :3, 0]
+    np.testing.assert_allclose(found, (waves * hit[:, :, None]).mean(axis=1).T, atol=0.02)
