@@ -31,7 +31,7 @@ SIDE = 48
 VIEW = ["--receiver", "view", "--size", f"{SIDE}x{SIDE}", "--light-set", "gather", "--pool", "8000", "--seed", "77", "--holdout", "0"]
 ENERGY = 0.02  # of each light, by Cycles as the scene has it and as its values say: both have noise
 PICTURE = 0.05  # relative RMSE of a picture under all lights
-SAMPLES = 192
+SAMPLES, FEW = 192, 48  # of pictures of all lights, and of one
 DISK = np.sqrt(np.pi) / 2
 
 
@@ -118,10 +118,10 @@ def test_each_light_has_its_energy(shot: tuple[Path, str], scene: Callable[[str]
     """Made again in Cycles from its values, it lays as much light on the view as the scene's own."""
     asset = Asset.open(shot[0] / "asset")
     lights = asset.manifest["scene_lights"]
-    for one, own in zip(lights, each_by_cycles(scene("designed"), [one["name"] for one in lights], SAMPLES), strict=True):
-        made = render_given(asset, scene("designed"), [one["light"]], SAMPLES).image
+    for one, own in zip(lights, each_by_cycles(scene("designed"), [one["name"] for one in lights], FEW), strict=True):
+        made = render_given(asset, scene("designed"), [one["light"]], FEW).image
         np.testing.assert_allclose(made.mean(axis=(0, 1)), own.mean(axis=(0, 1)), rtol=ENERGY, err_msg=one["name"])
-        assert relative(made, own) < 0.25, one["name"]  # noise of both, most of it at the disk
+        assert relative(made, own) < 0.35, one["name"]  # noise of both, most of it at the disk
 
 
 def test_relighting_by_them_is_what_cycles_renders(shot: tuple[Path, str], scene: Callable[[str], Path], tmp_path: Path) -> None:
