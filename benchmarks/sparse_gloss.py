@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from sparse import LOBES, lighting, prepared, traced
 
+from srbf.brdf_factors import factored
 from srbf.capture import COVERED
 from srbf.cubemap_capture import CubemapCapture
 from srbf.fitting.options import fit
@@ -25,6 +26,7 @@ from srbf.receiver_gloss import FactoredGloss
 from srbf.sphere import random_directions
 
 TERMS = (1, 2, 4, 8, 16)
+ROUGHNESSES = (0.3, 0.5, 0.7, 0.85, 1.0)
 VIEWERS, RECEIVERS = 6, 1024
 WAYS = ("full", "neighbors")
 STEP = 64  # receivers at a time
@@ -145,14 +147,24 @@ def seconds_of_terms(capture: CubemapCapture, terms: int) -> float:
     return time.process_time() - began
 
 
+def print_factors() -> None:
+    """What terms leave out of lobes, relative rms over lights and viewers by their cosine, by roughness, of plastic and metal."""
+    for roughness in ROUGHNESSES:
+        for name, along in (("plastic", 0.04), ("metal", 0.8)):
+            words = [f"{terms}: {factored(roughness, along, 1.0, terms).left_out ** 0.5:.3f}" for terms in (*TERMS, 32)]
+            print(f"roughness {roughness} {name}", *words)
+
+
 def main() -> None:
     """Print rows per scene, receiver and way of sampling."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenes", nargs="+", type=Path)
+    parser.add_argument("scenes", nargs="*", type=Path, help="none: what terms leave out of lobes, by roughness")
     parser.add_argument("--side", type=int, default=32)
     parser.add_argument("--fit", action="store_true")
     parser.add_argument("--receivers", default="Figure,Ground")
     arguments = parser.parse_args()
+    if not arguments.scenes:
+        print_factors()
     lights = lighting(arguments.side)
     toward = random_directions(8 * VIEWERS, "sphere", np.random.default_rng(8))
     viewers = toward[toward[:, 2] > 0.2][:VIEWERS]  # as one looks at a figure on a ground

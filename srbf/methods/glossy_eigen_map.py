@@ -78,6 +78,7 @@ class GlossyEigenMap(ComponentMaps):
     has_shader: ClassVar[bool] = False
     exportable: ClassVar[bool] = False
     on_page: ClassVar[bool] = False
+    has_report: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
     tables: ClassVar[dict[str, str]] = {
         "light_coefficients": "light_coefficients.exr",

@@ -98,6 +98,7 @@ class Method(ABC):
     has_shader: ClassVar[bool] = True  # `glsl/methods/STEM.glsl` is there
     exportable: ClassVar[bool] = True  # layers may be encoded otherwise, for engines
     on_page: ClassVar[bool] = True  # the viewer's page and the npm package show it
+    has_report: ClassVar[bool] = True  # `srbf report` draws it
     takes_objects: ClassVar[bool] = False  # whether a named light is an object whose surfaces emit
     takes_profiles: ClassVar[bool] = False  # whether lights inside its scene may have a profile
     takes_links: ClassVar[bool] = False  # whether lights may choose the objects that they shine on, and that shadow them

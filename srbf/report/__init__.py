@@ -13,7 +13,7 @@ from srbf.evaluation.rate_distortion import compared_methods
 from srbf.io import files
 from srbf.light_domain import domain_of_asset, domain_of_capture
 from srbf.lights import Light
-from srbf.methods import Method
+from srbf.methods import Method, method_of
 from srbf.report.directions_report import DirectionsReport
 from srbf.report.domain_report import DomainReport
 from srbf.report.names_report import NamesReport
@@ -119,7 +119,9 @@ def write_report(
 
 
 def check_domains(asset: Asset, capture: Capture) -> None:
-    """InputError where the lights of a capture are not those that an asset is a function of."""
+    """InputError where the lights of a capture are not those that an asset is a function of, and for methods without a report."""
+    if not method_of(asset).has_report:
+        raise InputError(f"expected an asset that a report shows, found a {asset.method} one; `srbf evaluate` gives its errors")
     domain = domain_of_asset(asset.manifest)
     if domain_of_capture(capture).kind != domain.kind:
         wanted = " or ".join(domain.captured_kinds)

@@ -138,7 +138,12 @@ def test_the_command_line_fits_within_a_budget_evaluates_and_relights(capture: C
     assert told["viewers"]["holdout"]["factorization"] <= told["viewers"]["holdout"]["relative_rmse"] < 1
     assert "of the factorization alone" in done("evaluate", tmp_path / "asset", capture.folder)
     done("relight", tmp_path / "asset", "--directional", "0.3,0.2,1", "--viewer", "1.5,-1,1.2", "-o", tmp_path / "image.exr")
-    for words in (["view", tmp_path / "asset"], ["export", tmp_path / "asset", "--target", "gltf", "-o", tmp_path / "gltf"]):
+    refused = (
+        ["view", tmp_path / "asset"],
+        ["export", tmp_path / "asset", "--target", "gltf", "-o", tmp_path / "gltf"],
+        ["report", tmp_path / "asset", capture.folder, "-o", tmp_path / "report.html"],
+    )
+    for words in refused:
         result = CliRunner().invoke(app, [str(word) for word in words])
         (line,) = [line for line in result.stderr.splitlines() if "expected an asset that" in line]
         assert result.exit_code == 1 and "glossy-eigen-map" in line
