@@ -188,3 +188,29 @@ def test_shadows_on_a_mesh_are_as_sharp_as_the_screen(chromium: Any, split: Asse
     assert indirect.max() > 0.02
     assert inside.mean() > 0.2
     np.testing.assert_allclose(both[inside], total[inside], atol=0.02)
+
+
+@pytest.mark.parametrize("split", ["irradiance"], indirect=True)
+def test_pixels_keep_their_light_over_changes_of_asset_and_view(
+    chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path
+) -> None:
+    from_above(tmp_path / "one", split, lambda _: "", "both")
+    from_above(tmp_path / "other", replace(split, stored=-split.stored), lambda _: "", "both")
+
+    def shown() -> np.ndarray:
+        (tmp_path / "saved.png").write_bytes(chromium.file("Picture (PNG)"))
+        return read_image(tmp_path / "saved.png", 3)
+
+    def pressed(key: str, expected: dict[str, Any]) -> np.ndarray:
+        chromium("press", keys=[key])
+        assert {name: chromium.state().get(name, 0) for name in expected} == expected
+        return shown()
+
+    hashed = from_above(tmp_path / "state", split, lambda _: "", "both")
+    chromium("open", url=serve([tmp_path / "one", tmp_path / "other"]) + hashed, width=WIDTH, height=HEIGHT)
+    first = shown()
+    assert np.abs(pressed("a", {"asset": 1}) - first).max() > 0.05
+    np.testing.assert_array_equal(pressed("a", {"asset": 0}), first)
+    views = [pressed("t", {}) for _ in range(2)]
+    assert views[0].shape != first.shape, "of the texels"
+    np.testing.assert_array_equal(views[1], first)
