@@ -90,12 +90,12 @@ class ReceiverGloss:
         rounded = np.round(self.roughness[shown], DIGITS)
         levels = np.unique(np.quantile(rounded, np.linspace(0, 1, MOST_CLASSES), method="nearest"))
         index = np.abs(rounded[:, None] - levels).argmin(axis=1)
-        found = []
+        found: list[tuple[float, float, float]] = []
         for number, level in enumerate(levels.tolist()):
             own = np.flatnonzero(shown)[index == number]
-            ends = [round(float(end[own].mean()), DIGITS) for end in (self.along, self.grazing)]
-            found.append((float(level), *(max(end, 10.0**-DIGITS) for end in ends)))
-        return found  # type: ignore[return-value]
+            along, grazing = (max(round(float(end[own].mean()), DIGITS), 10.0**-DIGITS) for end in (self.along, self.grazing))
+            found.append((float(level), along, grazing))
+        return found
 
 
 @dataclass(frozen=True, eq=False)

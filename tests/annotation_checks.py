@@ -50,7 +50,8 @@ def first_calls(what: Any = None, *, typechecker: Any = None) -> Any:
         return first_calls
     if isinstance(what, type):
         if is_dataclass(what):
-            what.__init__ = first_calls(what.__init__)  # type: ignore[method-assign]
+            checked_class: Any = what
+            checked_class.__init__ = first_calls(checked_class.__init__)
         return what
     if not isinstance(what, FunctionType):
         return whole(what, typechecker=check)

@@ -1,9 +1,9 @@
 """A linear filter that removes noise on surfaces and preserves edges: planes fitted to the neighbors that agree within the noise.
 
-Guide values of a known noise variance decide the weights. A plane is fitted to the neighbors of a texel, and again to those within the
-noise of it. The texel's row of the filter evaluates that plane at the texel. Where fewer than half of the neighbors agree, as at edges, the
-texel is kept. A texel that is itself far off the plane has no weight in its own fit. Where there is no noise, almost nothing changes, as
-with non-local means of a known variance [Buades2005; Takeda2007].
+Guide values of a known noise variance decide the weights. For each texel a plane is fitted to its neighbors, and fitted again to those
+that are within the noise of the plane. Its row of the filter is the value of that plane at the texel. Where fewer than half of the
+neighbors agree, as at edges, the texel keeps its value. One that is far off the plane of its neighbors has no weight in its own fit. Where
+there is no noise, almost nothing changes, as with non-local means of a known variance [Buades2005; Takeda2007].
 """
 
 from __future__ import annotations

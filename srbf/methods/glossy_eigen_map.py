@@ -44,8 +44,8 @@ class GlossyEigenMap(ComponentMaps):
     B(p, v) ~ T_0(p) L + sum_i g_i(p, v) T_i(p) L,  T_i(p, l) ~ w_{m,0,i}(l) + sum_j a_j(p) w_{m,j,i}(l), m the cluster of p
 
     T_0 is diffuse reflection with all bounces, by color; T_i = f_i V NoL, i = 1 … `terms`, where f_i and g_i are factors of the BRDF. All
-    terms of a texel share its components, since they share visibility. A frame's lights become one weight per function, term and color;
-    a receiver's sums give 1 + `terms` colors, and those with g_i toward the viewer its radiance.
+    terms have the same components per texel, since they have the same visibility. The lights of a frame become one weight per function,
+    term and color; per receiver, sums with these give 1 + `terms` colors, and their sum weighted by g_i toward the viewer is radiance.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ void main() {
     gl_Position = projectionMatrix * viewMatrix * world;
 }`;
 
-// The normal is the baked one, bumps included, unless what a texel holds is of another surface.
+// The baked normal, bumps included, unless it differs so much from the mesh's that it is of another surface.
 const FRAGMENT = `precision highp float;
 precision highp sampler2D;
 in vec3 vPlace, vNormal;
