@@ -339,7 +339,7 @@ def _relight_frames(
             update(number + 1, len(frames))
         for line in added.notes([light for frame in frames for light in frame]):
             note(line)
-    note(f"wrote {len(frames)} images into {output}")
+    note(f"wrote {len(frames)} {'image' if len(frames) == 1 else 'images'} into {output}")
 
 
 def _check_probe_flags(output: Path, harmonics: bool, at: Path | None, lights: Path | None) -> None:
