@@ -1,4 +1,5 @@
-"""Visibility sampled where it changes: receivers from coarse to fine, and of each only what its coarser neighbors do not agree on."""
+"""Visibility sampled where it changes: receivers from coarse to fine, and of each what neither its coarser neighbors nor the directions
+around agree on."""
 
 from __future__ import annotations
 
@@ -15,11 +16,12 @@ from srbf.visibility.element_tracer import Bits, ElementTracer
 
 WINDOW = 3  # texels around a direction, 7 x 7 in all, whose samples tell whether visibility changes there [Huang2010]
 COARSEST, FEWEST = 64, 64  # receivers of the first level: one of how many; at least
-NEIGHBORS = 12  # coarser receivers that must agree
+NEIGHBORS = 16  # coarser receivers that must agree
+AROUND = 3  # of four directions around one, that must be known to decide it
 FACING = 2.0  # of a level's spacing: how far apart two receivers count as whose normals differ by a unit vector
 NORMALS = 3.0  # steps of a normal's coordinates, from -1 to 1, that share a cell
-ROWS = 512  # receivers at a time
-TESTED, TESTED_ROWS = 32, 8  # one guessed element of how many is traced to predict the error, of one receiver of how many
+ROWS = 256  # receivers at a time
+TESTED, TESTED_ROWS = 16, 16  # one guessed element of how many is traced to predict the error, of one receiver of how many
 Progress = Callable[[int, int], None]
 
 
@@ -38,20 +40,21 @@ def refined(
     """Visibility of all elements, of which those are traced whose neighbors differ.
 
     The coarsest receivers are sampled on a quarter of the directions, and wherever the samples within 7 x 7 texels differ [Huang2010,
-    section 4.2]. Every other receiver, level by level, has the visibility that its `neighbors` nearest coarser receivers agree on, and is
-    traced where they do not. Some guessed elements are traced to predict the error.
+    section 4.2]. Every other receiver, level by level, has the visibility that its `neighbors` nearest coarser receivers agree on. Where
+    they do not, it is traced on every other direction, and on those between as far as the directions around them differ. Some guessed
+    elements are traced to predict the error.
     """
     levels = levels_of(tracer.starts, tracer.normals, seed)
     bits = np.zeros((tracer.count, tracer.row_bytes), np.uint8)
     asked, done = 0, 0
-    tally = _Tally.empty(seed)
+    tally, board = _Tally.empty(seed), _Checkerboard.of(cubemap)
     for number, (spacing, rows) in enumerate(levels):
         if number == 0:
             asked += coarse_rows(tracer, cubemap, rows, bits)
         else:
             known = np.concatenate([own for _, own in levels[:number]])
             near, _ = nearest_of(tracer.starts, tracer.normals, rows, known, spacing, neighbors)
-            asked += _agreed(tracer, rows, near, bits, tally)
+            asked += _agreed(tracer, rows, near, bits, board, tally)
         done += len(rows)
         progress(done, tracer.count)
     return SampledVisibility(bits, asked + tally.tested, tally.error())
@@ -158,13 +161,28 @@ def coarse_rows(tracer: ElementTracer, cubemap: Cubemap, rows: Int[ndarray, " n"
     return int(asked[0])
 
 
-def _agreed(tracer: ElementTracer, rows: Int[ndarray, " n"], near: Int[ndarray, "n k"], bits: Bits, tally: _Tally) -> int:
-    """Visibility of `rows` from what their neighbors agree on, and rays where they do not; how many elements were asked for."""
-    starts = range(0, len(rows), ROWS)
-    asked = np.zeros(len(starts), np.int64)
-    left = np.empty((len(rows), tracer.row_bytes), np.uint8)
+@dataclass(frozen=True, eq=False)
+class _Checkerboard:
+    """Directions of which one color is decided first, those of the other, `between` (N,), then by the four around each."""
 
-    def compare(number: int) -> None:
+    between: Bool[ndarray, " N"]
+    around: Int[ndarray, "N 4"]
+
+    @staticmethod
+    def of(cubemap: Cubemap) -> _Checkerboard:
+        odd = np.arange(cubemap.side) % 2 == 1
+        return _Checkerboard(np.tile((odd[:, None] != odd).ravel(), 6), cubemap.window(1)[:, [1, 3, 5, 7]])
+
+
+def _agreed(
+    tracer: ElementTracer, rows: Int[ndarray, " n"], near: Int[ndarray, "n k"], bits: Bits, board: _Checkerboard, tally: _Tally
+) -> int:
+    """Visibility of `rows` from what their neighbors agree on, then from the directions around; rays for the rest, which are counted."""
+    starts = range(0, len(rows), ROWS)
+    asked = [0] * len(starts)
+    traced = np.empty((len(rows), tracer.row_bytes), np.uint8)
+
+    def decide(number: int) -> None:
         part = slice(starts[number], starts[number] + ROWS)
         own = rows[part]
         above = tracer.above_bits(own)
@@ -172,14 +190,43 @@ def _agreed(tracer: ElementTracer, rows: Int[ndarray, " n"], near: Int[ndarray, 
         for k in range(near.shape[1]):
             theirs = bits[near[part, k]]
             all_seen, all_hidden = all_seen & theirs, all_hidden & ~theirs
-        left[part] = above & ~(all_seen | all_hidden)
-        bits[own] = above & all_seen
-        asked[number] = int(_ones(left[part]))
+        left = above & ~(all_seen | all_hidden)
+        bits[own], traced[part] = _decided(tracer, own, above & all_seen, left, above & ~left, board)
+        asked[number] = _ones(traced[part])
 
-    each(compare, len(starts))
-    tracer.add_seen(bits, rows, left)
-    tally.add(tracer, rows, left, bits)
-    return int(asked.sum())
+    each(decide, len(starts))
+    tracer.rays += sum(asked)
+    tally.add(tracer, rows, traced, bits)
+    return sum(asked)
+
+
+def _decided(
+    tracer: ElementTracer, rows: Int[ndarray, " n"], seen: Bits, left: Bits, known: Bits, board: _Checkerboard
+) -> tuple[Bits, Bits]:
+    """(`seen` with the elements that are `left`, which of these were traced)."""
+    size = len(board.between)
+    values, is_known = (np.unpackbits(one, axis=1, count=size).ravel() for one in (seen, known))
+    by_ray = np.zeros_like(values)
+
+    def trace(row: Int[ndarray, " m"], column: Int[ndarray, " m"]) -> None:
+        flat = row * size + column
+        values[flat] = ~tracer.occluders.occluded(tracer.starts[rows[row]], tracer.directions[column], None)
+        is_known[flat] = by_ray[flat] = 1
+
+    byte = np.flatnonzero(left)
+    place = np.flatnonzero(np.unpackbits(left.ravel()[byte]))
+    row, within = np.divmod(byte[place >> 3], left.shape[1])
+    column = 8 * within + (place & 7)
+    between = board.between[column]
+    trace(row[~between], column[~between])
+    row, column = row[between], column[between]
+    around = (row * size)[:, None] + board.around[column]
+    there = is_known[around]
+    count, lit = there.sum(axis=1), (values[around] & there).sum(axis=1)
+    agree = (count >= AROUND) & ((lit == 0) | (lit == count))
+    values[row[agree] * size + column[agree]] = lit[agree] > 0
+    trace(row[~agree], column[~agree])
+    return np.packbits(values.reshape(-1, size), axis=1), np.packbits(by_ray.reshape(-1, size), axis=1)
 
 
 @dataclass(eq=False)

@@ -9,9 +9,10 @@ import pytest
 from closed_forms import ball, quad
 
 from srbf.cubemap import Cubemap
+from srbf.visibility import refined_visibility
 from srbf.visibility.element_tracer import ElementTracer
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.refined_visibility import SampledVisibility, coarse_rows, levels_of, refined
+from srbf.visibility.refined_visibility import AROUND, SampledVisibility, coarse_rows, levels_of, refined
 from srbf.visibility.sparse_transport import l1_combination, sparsely_sampled
 
 pytest.importorskip("embreex")
@@ -80,6 +81,19 @@ def test_a_part_of_the_elements_tells_the_rest(sample: Sample) -> None:
     assert tracer.rays < 0.6 * whole.rays and found.asked < 0.5 * tracer.count * CUBEMAP.count
     assert under_suns(found.bits, true, tracer) < GOOD[sample]
     assert 0 <= found.error < 0.2
+
+
+def test_directions_between_others_that_agree_need_no_ray(monkeypatch: pytest.MonkeyPatch) -> None:
+    cubemap = Cubemap(16)
+    true = tracer_of(BALL, cubemap=cubemap).all_seen()
+    found: dict[int, SampledVisibility] = {}
+    for least in (AROUND, 5):  # of four: none is guessed
+        monkeypatch.setattr(refined_visibility, "AROUND", least)
+        found[least] = refined(tracer_of(BALL, cubemap=cubemap), cubemap, 0)
+    tracer = tracer_of(BALL, cubemap=cubemap)
+    guessed, traced = (under_suns(one.bits, true, tracer) for one in found.values())
+    assert found[AROUND].asked < 0.85 * found[5].asked
+    assert guessed < traced + 0.01
 
 
 @SAMPLERS
