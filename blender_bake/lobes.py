@@ -80,7 +80,7 @@ def _colors(
         output = tree.get_output_node("CYCLES") if tree is not None else None
         if tree is None or output is None:
             continue
-        found = _of_input(tree, output.inputs["Surface"], groups)
+        found = of_surface(tree, output.inputs["Surface"], groups)
         if found.weight == 0.0:
             yield tree, output.inputs["Surface"], None
             continue
@@ -108,24 +108,35 @@ def remove(layer: bpy.types.ViewLayer) -> None:
         layer.aovs.remove(found)
 
 
-def _of_input(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, groups: dict[str, Lobe]) -> Lobe:
-    return _of_shader(tree, socket.links[0].from_socket, groups) if socket.links else Lobe()
+def _feeding(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
+    """The output that feeds an input; nothing where its link is muted."""
+    return next((link.from_socket for link in socket.links if link.is_valid and not link.is_muted), None)
+
+
+def of_surface(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, groups: dict[str, Lobe] | None = None) -> Lobe:
+    """The sums of the shader that feeds an input, numbers or outputs of the tree; `groups`: of node groups, kept for all their users."""
+    groups = {} if groups is None else groups
+    shader = _feeding(socket)
+    return Lobe() if shader is None else _of_shader(tree, shader, groups)
 
 
 def _of_shader(tree: bpy.types.NodeTree, shader: bpy.types.NodeSocket, groups: dict[str, Lobe]) -> Lobe:
     """Of the shader that a socket puts out."""
     node = shader.node
     kind = node.bl_idname
+    if node.mute:
+        through = next((way.from_socket for way in node.internal_links if way.to_socket == shader), None)
+        return Lobe() if through is None else of_surface(tree, through, groups)
     if kind == "NodeReroute":
-        return _of_input(tree, node.inputs[0], groups)
+        return of_surface(tree, node.inputs[0], groups)
     if kind == "ShaderNodeMixShader":
-        one, other = (_of_input(tree, node.inputs[i], groups) for i in (1, 2))
-        share = _value(node.inputs[0])
+        one, other = (of_surface(tree, node.inputs[i], groups) for i in (1, 2))
+        share = _share(tree, node.inputs[0])
         rest = _math(tree, "SUBTRACT", 1.0, share)
         pairs = zip(one.parts, other.parts, strict=True)
         return Lobe(*(_math(tree, "ADD", _math(tree, "MULTIPLY", rest, a), _math(tree, "MULTIPLY", share, b)) for a, b in pairs))
     if kind == "ShaderNodeAddShader":
-        one, other = (_of_input(tree, socket, groups) for socket in node.inputs)
+        one, other = (of_surface(tree, socket, groups) for socket in node.inputs)
         return Lobe(*(_math(tree, "ADD", a, b) for a, b in zip(one.parts, other.parts, strict=True)))
     if kind == "ShaderNodeGroup" and node.node_tree is not None:
         return _of_group(node, shader, groups)
@@ -133,8 +144,8 @@ def _of_shader(tree: bpy.types.NodeTree, shader: bpy.types.NodeSocket, groups: d
         return Lobe()
     weight: Value = 1.0
     if "Metallic" in node.inputs:
-        weight = _math(tree, "ADD", DIELECTRIC, _math(tree, "MULTIPLY", 1 - DIELECTRIC, _value(node.inputs["Metallic"])))
-    return Lobe(_math(tree, "MULTIPLY", weight, _value(node.inputs["Roughness"])), weight if kind in FRESNEL else 0.0, weight)
+        weight = _math(tree, "ADD", DIELECTRIC, _math(tree, "MULTIPLY", 1 - DIELECTRIC, _share(tree, node.inputs["Metallic"])))
+    return Lobe(_math(tree, "MULTIPLY", weight, _share(tree, node.inputs["Roughness"])), weight if kind in FRESNEL else 0.0, weight)
 
 
 def _of_group(node: bpy.types.Node, shader: bpy.types.NodeSocket, groups: dict[str, Lobe]) -> Lobe:
@@ -146,7 +157,7 @@ def _of_group(node: bpy.types.Node, shader: bpy.types.NodeSocket, groups: dict[s
         if output is None or not output.bl_idname.endswith("GroupOutput"):
             output = next((one for one in inner.nodes if one.bl_idname == "NodeGroupOutput" and one.is_active_output), None)
         source = None if output is None else next((one for one in output.inputs if one.identifier == shader.identifier), None)
-        groups[key] = Lobe() if source is None else _of_input(inner, source, groups)
+        groups[key] = Lobe() if source is None else of_surface(inner, source, groups)
         if groups[key].weight != 0.0:
             assert output is not None
             for name, value in zip(names, groups[key].parts, strict=True):
@@ -155,8 +166,14 @@ def _of_group(node: bpy.types.Node, shader: bpy.types.NodeSocket, groups: dict[s
     return Lobe() if groups[key].weight == 0.0 else Lobe(*(node.outputs[name] for name in names))
 
 
-def _value(socket: bpy.types.NodeSocket) -> Value:
-    return socket.links[0].from_socket if socket.links else float(socket.default_value)
+def _share(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> Value:
+    """What an input holds, 0 to 1, as Cycles takes it."""
+    feeding = _feeding(socket)
+    if feeding is None:
+        return min(max(float(socket.default_value), 0.0), 1.0)
+    within = tree.nodes.new("ShaderNodeClamp")
+    tree.links.new(feeding, within.inputs["Value"])
+    return within.outputs[0]
 
 
 def _put(tree: bpy.types.NodeTree, value: Value, socket: bpy.types.NodeSocket) -> None:
