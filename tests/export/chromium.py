@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from npm_package import CHROMIUM
 
 PAGE = Path(__file__).parent / "webgpu.html"
 FLAGS = [
@@ -24,7 +25,7 @@ SECONDS = 90
 
 
 def browser() -> str | None:
-    return shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    return next(filter(None, map(shutil.which, CHROMIUM)), None)
 
 
 def encoded(values: np.ndarray) -> str:

@@ -15,6 +15,7 @@ const browser = await chromium.launch({
     "--disable-background-networking",
     "--disable-sync",
     "--no-first-run",
+    "--disable-gpu-rasterization",
   ],
 });
 const said = [];
