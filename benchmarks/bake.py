@@ -128,7 +128,7 @@ def interpolated(capture: Capture, tests: Capture) -> float:
     sample = TexelSample(texels, both, np.concatenate([lights, tests.directions(validation)]), len(train), domain)
     centers = dense_centers(lights, domain)
     model = choose_functions(sample, centers)
-    path = KernelPath(model.kernel.between(lights, lights, centers))
+    path = KernelPath.of(model.kernel.between(lights, lights, centers))
     weights = path.solve(model.ridge, model.kernel.between(tests.directions(holdout), lights, centers).T).T  # (V, L)
     predicted = np.maximum(np.einsum("vl,plc->pvc", weights.astype(np.float32), seen, optimize=True), 0)
     return float(np.sqrt(((predicted - unseen) ** 2).mean() / (unseen**2).mean()))

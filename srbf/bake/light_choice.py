@@ -260,7 +260,7 @@ def _by_directions(
         sample = TexelSample(np.arange(len(both)), both, np.concatenate([lights, tested]), count, domain)
         centers = dense_centers(lights, domain)
         model = choose_functions(sample, centers)
-        path = KernelPath(model.kernel.between(lights, lights, centers))
+        path = KernelPath.of(model.kernel.between(lights, lights, centers))
         weights = path.solve(model.ridge, model.kernel.between(tested, lights, centers).T).T  # (V, L)
         predicted = np.einsum("vl,nlc->nvc", weights, responses[:, chosen].astype(np.float64))
         spread = float((weights**2).sum(axis=1).mean())

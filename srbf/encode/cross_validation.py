@@ -44,22 +44,17 @@ class HeldOut:
         """Whether there are validation lights."""
         return len(self.root) > self.train
 
-    def single(self, path: KernelPath, ridge: float) -> Float64[ndarray, " L"]:
-        """Squared error of every train light if it alone is left out."""
+    def left_out(self, path: KernelPath, ridge: float) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " G"]]:
+        """Squared errors of every train light if it alone is left out, and of the middle light of every band if the band is."""
         solved = path.solve(ridge, self.root[: self.train])
-        squares = np.einsum("lr,lr->l", solved, solved) + self.noise * path.diagonal(ridge, 2)
-        return squares / path.diagonal(ridge) ** 2
-
-    def in_bands(self, path: KernelPath, ridge: float) -> Float64[ndarray, " G"]:
-        """Squared error of the middle light of every band if the band is left out."""
-        solved = path.solve(ridge, self.root[: self.train])
+        single = np.einsum("lr,lr->l", solved, solved) + self.noise * path.diagonal(ridge, 2)
         squares = []
         for groups in self.groups:
             weights = path.left_out_weights(ridge, groups)
             residual = np.einsum("gs,gsr->gr", weights, solved[groups])
             noise = np.einsum("gs,gst,gt->g", weights, path.blocks(ridge, groups, 2), weights)
             squares.append(np.einsum("gr,gr->g", residual, residual) + self.noise * noise)
-        return np.concatenate(squares)
+        return single / path.diagonal(ridge) ** 2, np.concatenate(squares)
 
     def validation(self, path: KernelPath, ridge: float, kernel: Float64[ndarray, "V L"]) -> Float64[ndarray, " V"]:
         """Squared error of every validation light, whose kernel with the train lights is `kernel`."""

@@ -43,9 +43,9 @@ class Fingerprints:
         """`gram`: inner products of the lights' responses on a sample of texels, by which the ridge is chosen: exact leave-one-out."""
         scales = [_averaged(received, areas, group) for group in groups]
         shares = tuple(len(received) / max(float((scale**2).sum()), 1e-30) for scale in scales)
-        kernel = sum(share * scale @ scale.T for share, scale in zip(shares, scales, strict=True))
-        path = KernelPath(np.asarray(kernel))
-        mean = float(np.diag(path.kernel).mean())
+        kernel = np.asarray(sum(share * scale @ scale.T for share, scale in zip(shares, scales, strict=True)))
+        path = KernelPath.of(kernel)
+        mean = float(np.diag(kernel).mean())
         found = [(ridge * mean, left_out_errors(path, ridge * mean, gram)) for ridge in RIDGES]
         ridge, errors = min(found, key=lambda one: float(np.log(np.maximum(one[1], 1e-12)).mean()))
         return Fingerprints(received, areas, groups, ridge, errors, path, shares)

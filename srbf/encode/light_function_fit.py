@@ -63,10 +63,10 @@ def choose_functions(
 
     def work(i: int) -> None:
         kernel, matrix = kernels[i]
-        path = KernelPath(matrix[: sample.train])
+        path = KernelPath.of(matrix[: sample.train])
         scale = float(np.diag(matrix).mean())
         for penalty in [share * scale for share in RIDGES] if ridge is None else [ridge]:
-            single, banded = held_out.single(path, penalty), held_out.in_bands(path, penalty)
+            single, banded = held_out.left_out(path, penalty)
             unseen = held_out.validation(path, penalty, matrix[sample.train :]) if held_out.validated else None
             error = float((single if unseen is None else unseen).mean())
             found[i].append((held_out.score(single, banded, unseen), FunctionModel(kernel, penalty, rule, error)))
@@ -106,7 +106,7 @@ def fit_functions(
 ) -> LightFunctions:
     """Smooth functions through `values` at the train lights."""
     lights = sample.coordinates[: sample.train]
-    path = KernelPath(model.kernel.between(lights, lights, centers))
+    path = KernelPath.of(model.kernel.between(lights, lights, centers))
     solved = path.solve(model.ridge, values.reshape(len(values), -1))
     return model.kernel.functions(solved, lights, centers, domain.manifest()["domain"])
 

@@ -101,9 +101,9 @@ def choose(
 
     def work(i: int) -> None:
         spread, weights = tried[i]
-        path = KernelPath(weights[:train] @ weights[:train].T)
+        path = KernelPath.of_columns(weights[:train])
         for ridge in ridges:
-            single, banded = held_out.single(path, ridge), held_out.in_bands(path, ridge)
+            single, banded = held_out.left_out(path, ridge)
             unseen = held_out.validation(path, ridge, weights[train:] @ weights[:train].T) if held_out.validated else None
             if noise is not None:
                 lost = noise(path.solve(ridge, weights[:train]).T, weights)

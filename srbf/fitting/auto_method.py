@@ -150,8 +150,8 @@ def _between_lights(capture: Capture) -> Float64[ndarray, " L"]:
     lights = sample.coordinates
     centers = dense_centers(lights, sample.domain)
     model = choose_functions(sample, centers)
-    path = KernelPath(model.kernel.between(lights, lights, centers))
-    return sample.held_out().single(path, model.ridge) / 4
+    path = KernelPath.of(model.kernel.between(lights, lights, centers))
+    return sample.held_out().left_out(path, model.ridge)[0] / 4
 
 
 @dataclass(frozen=True)

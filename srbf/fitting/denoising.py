@@ -113,9 +113,10 @@ class _Part:
         """RMSE under each validation light of a fit to the texels, with noise and without."""
         tried = method.on_sample(self.covered / len(self.tried))
         noisy, quiet = (one.load(self.tried) for one in (self.noisy, self.quiet))
+        unseen = noisy.with_roles([light.role if light.role == "validation" else None for light in noisy.lights])  # no train light is read
         found = []
         for trial in (noisy, quiet):
-            errors = evaluate(tried.encode(trial), noisy, roles=("validation",))
+            errors = evaluate(tried.encode(trial), unseen, roles=("validation",))
             found.append(np.array([light["rmse"] for light in errors["lights"]]))
         return found[0], found[1]
 

@@ -50,7 +50,7 @@ def test_errors_are_those_of_fits_without_the_lights(count: int) -> None:
     images = basis @ rng.normal(size=(50, 300)) + 0.01 * rng.normal(size=(count + 7, 300))
     held_out = HeldOut.of(images @ images.T / 300, Directions("sphere").left_out_groups(lights[:count]), count)
     kernel = basis @ basis.T
-    path = KernelPath(kernel[:count, :count])
+    path = KernelPath.of(kernel[:count, :count])
 
     def predicted(light: int, rest: np.ndarray) -> np.ndarray:
         solved = np.linalg.solve(kernel[np.ix_(rest, rest)] + RIDGE * np.eye(len(rest)), images[rest])
@@ -60,10 +60,10 @@ def test_errors_are_those_of_fits_without_the_lights(count: int) -> None:
         return float(((images[light] - predicted(light, np.setdiff1d(np.arange(count), without))) ** 2).mean())
 
     tolerance = ROUNDING if count <= 128 else 0.2  # what is beyond the principal directions counts as noise, equally at all lights
-    single = held_out.single(path, RIDGE)
+    single, banded = held_out.left_out(path, RIDGE)
     assert single[:12] == pytest.approx([error(i, np.array([i])) for i in range(12)], rel=tolerance)
     groups = [group for array in held_out.groups for group in array]
-    assert held_out.in_bands(path, RIDGE)[:6] == pytest.approx([error(int(g[0]), g) for g in groups[:6]], rel=tolerance)
+    assert banded[:6] == pytest.approx([error(int(g[0]), g) for g in groups[:6]], rel=tolerance)
     unseen = held_out.validation(path, RIDGE, kernel[count:, :count])
     assert unseen == pytest.approx([error(count + i, np.array([], np.int64)) for i in range(7)], rel=tolerance)
 
