@@ -31,6 +31,7 @@ from srbf.bake.shard import Shard
 from srbf.bake.worker import Worker
 from srbf.bake.worker_pool import RemoteResult, Renderer, Response, Task, WorkerPool, WorkerPoolSettings
 from srbf.capture import Capture
+from srbf.captured_light import ROLES, Role
 from srbf.errors import BakeError, InputError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
@@ -73,11 +74,13 @@ class Bake:
     pool
         The workers of this machine.
     time_limit
-        Seconds after which no further light is begun; None: no limit. 0: form factors of surfels alone, another run adds lights.
+        Seconds after which no further light is begun; None: no limit.
     keep_accumulation
         Keep the accumulation folder of a finished bake, so that samples can be added later.
     dask
         Address of a scheduler whose workers render, instead of `pool`.
+    roles
+        Lights of these alone, and what needs no light; another run adds the others.
 
     Raises
     ------
@@ -102,6 +105,7 @@ class Bake:
     time_limit: float | None = None
     keep_accumulation: bool = False
     dask: str | None = None
+    roles: tuple[Role, ...] = ROLES
 
     def __post_init__(self) -> None:
         if self.time_limit is not None and self.settings.denoise:
@@ -210,7 +214,7 @@ class _Passes:
         self._bake, self._identity, self._reporter, self._shard = bake, identity, reporter, shard
         self._folder, self._settings = bake.folder, bake.settings
         self._lights = plan_lights(bake.settings)
-        self._order = render_order(self._lights)
+        self._order = [light for light in render_order(self._lights) if light.role in bake.roles]
         self._scratch = self._folder / SCRATCH
         # Named lights may each light a room of their own: their first ones do not tell whether any reaches the receiver.
         judged = 0 if isinstance(self._settings.light_set, NamedSet) else len(self._lights)
@@ -301,12 +305,10 @@ class _Passes:
                 f"the others are in {self._folder}, and the same command tries the failed ones again"
             )
         if self._is_time_up() and (self._tasks() or not self._settled):
-            if self._bake.time_limit:
-                self._reporter.say(
-                    stopping.time_is_up([self._accumulation.samples(light) for light in self._lights if light.role == "train"])
-                )
+            reached = [self._accumulation.samples(light) for light in self._lights if light.role == "train"]
+            self._reporter.say(stopping.time_is_up(reached))
             return
-        if self._shard is not None:
+        if self._shard is not None or len(self._order) < len(self._lights):
             return
         if self._lights and not self._first.lit and all(float(self._images.published(light).max()) <= 0 for light in self._lights):
             raise self._first.black(len(self._lights))  # rendered by shards of too few lights each to check
@@ -488,10 +490,10 @@ class _Passes:
         if self._bake.time_limit is not None:
             done, total = min(time.monotonic() - self._started, self._bake.time_limit), self._bake.time_limit
         else:
-            done = float(sum(min(self._accumulation.samples(light), self._goal_of(light)) for light in self._lights))
-            total = float(sum(self._goal_of(light) for light in self._lights))
-        reached = sum(self._accumulation.passes(light) >= sampling_pass for light in self._lights)
-        self._reporter.progress(done, total, f"pass {sampling_pass}: light {reached} of {len(self._lights)}")
+            done = float(sum(min(self._accumulation.samples(light), self._goal_of(light)) for light in self._order))
+            total = float(sum(self._goal_of(light) for light in self._order))
+        reached = sum(self._accumulation.passes(light) >= sampling_pass for light in self._order)
+        self._reporter.progress(done, total, f"pass {sampling_pass}: light {reached} of {len(self._order)}")
 
     def _log(self, line: str) -> None:
         with open(self._folder / LOG, "a", encoding="utf-8") as log:

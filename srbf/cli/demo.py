@@ -74,19 +74,20 @@ def _tour(output: Path, quality: Quality, view: bool) -> None:
 
 def _one(scene: str, output: Path, lights: int | None, transport: Literal["combined", "indirect"], quality: Quality, view: bool) -> None:
     from srbf.bake.run import Reporter
-    from srbf.demo import run_demo
-    from srbf.demo.dome import DOMES, run_demo_dome
-    from srbf.demo.inside import INSIDE, run_demo_inside
+    from srbf.demo import demo_steps, finished
+    from srbf.demo.dome import DOMES, dome_steps
+    from srbf.demo.inside import INSIDE, inside_steps
     from srbf.viewer.contents import contents_of
 
     with progress_bar(scene) as update:
         reporter = Reporter(update, note)
         if scene in INSIDE:
-            made = run_demo_inside(scene, output, reporter, update, quality)
+            steps = inside_steps(scene, output, reporter, update, quality)
         elif scene in DOMES:
-            made = run_demo_dome(scene, output, reporter, update, quality)
+            steps = dome_steps(scene, output, reporter, update, quality)
         else:
-            made = run_demo(scene, output, lights, reporter, update, quality, transport)
+            steps = demo_steps(scene, output, lights, reporter, update, quality, transport)
+        made = finished(steps)
     note(f"look at {made.page}" + (f" and {made.picture}" if made.picture else ""))
     if view:
         serve(contents_of(made.assets, made.capture, made.mesh))

@@ -6,7 +6,7 @@ import importlib.util
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -143,14 +143,20 @@ class Shown:
 
 
 Progress = Callable[[int, int, str], None]
-Ready = Callable[[Shown], None]
+Steps = Generator[Shown, None, Demo]  # of a demo: it waits once, as soon as the asset can be looked at; then its errors are measured
 
 
-def not_shown(shown: Shown) -> None:
-    """What is ready is not looked at."""
+def finished(steps: Steps) -> Demo:
+    """What all steps of a demo make."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            made: Demo = done.value
+            return made
 
 
-def run_demo(
+def demo_steps(
     name: str,
     folder: Path,
     lights: int | None,
@@ -158,11 +164,10 @@ def run_demo(
     progress: Progress,
     quality: Quality = "draft",
     transport: Transport = "combined",
-    ready: Ready = not_shown,
-) -> Demo:
-    """Build, bake, fit, evaluate and report the scene `name` in `folder`. Another run resumes it.
+) -> Steps:
+    """Build, bake and fit the scene `name` in `folder`, then evaluate and report it. Another run resumes it.
 
-    `lights`: directions, None for as many as the transport needs. `ready` is called once, as soon as the asset can be looked at.
+    `lights`: directions, None for as many as the transport needs. Lights that no fit reads are rendered after the wait.
     """
     scene, is_split = SCENES[name], transport == "indirect"
     lights = lights or (SPLIT_DIRECTIONS if is_split else DIRECTIONS)
@@ -174,7 +179,8 @@ def run_demo(
     scene_file(name, blend, reporter)
     settings = scene.settings(lights, quality, transport)
     reporter.say(f"baking {lights} directions at {settings.width}x{settings.height} with Cycles")
-    if bake_once(Bake(blend, capture_folder, settings), reporter):
+    bake = Bake(blend, capture_folder, settings)
+    if bake_once(replace(bake, roles=("train", "validation")), reporter):
         timings["bake"] = clock() - started
     capture = Capture.open(capture_folder)
     started = clock()
@@ -188,7 +194,11 @@ def run_demo(
         mesh = folder / "scene.glb"
         write_scene_mesh(blend, mesh, capture_folder, force=True, say=reporter.say)
     direct = direct_light() if is_split else "none"
-    ready(Shown(asset_folder, mesh, lambda: under_sun(asset, direct)))
+    yield Shown(asset_folder, mesh, lambda: under_sun(asset, direct))
+    started = clock()
+    if bake_once(bake, reporter):
+        timings["held-out lights"] = clock() - started
+    capture = Capture.open(capture_folder)
     started = clock()
     errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), watch=watch)
     whole = errors

@@ -9,7 +9,7 @@ from pathlib import Path
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
-from srbf.demo import PAGE_FIT, Demo, Progress, Quality, Ready, Shown, bake_once, not_shown, reported, scene_file, under_sun
+from srbf.demo import PAGE_FIT, Demo, Progress, Quality, Shown, Steps, bake_once, reported, scene_file, under_sun
 from srbf.demo.photographs import DIRS, POINT_LIGHTS, TEST, Dome, photograph, write_point_lights
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.importing.photographs import LightListImport
@@ -47,13 +47,8 @@ DOMES: dict[str, dict[Quality, Photographs]] = {
 }
 
 
-def run_demo_dome(
-    name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality = "draft", ready: Ready = not_shown
-) -> Demo:
-    """Build, photograph, import, fit, evaluate and report the scene `name` in `folder`. Another run resumes it.
-
-    `ready` is called once, as soon as the asset can be looked at.
-    """
+def dome_steps(name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality = "draft") -> Steps:
+    """Build, photograph, import and fit the scene `name` in `folder`, then evaluate and report it. Another run resumes it."""
     taken = DOMES[name][quality]
     dome = taken.dome
     files.make_folder(folder)
@@ -75,7 +70,7 @@ def run_demo_dome(
     asset = PAGE_FIT.encode(capture, FitRun(lambda done, total: progress(done, total, "fit")))
     timings["fit"] = clock() - started
     asset.save(asset_folder, force=True)
-    ready(Shown(asset_folder, None, lambda: under_sun(asset, "none", RAKING)))
+    yield Shown(asset_folder, None, lambda: under_sun(asset, "none", RAKING))
     started = clock()
     errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"))
     timings["evaluate"] = clock() - started

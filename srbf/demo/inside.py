@@ -14,7 +14,7 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.scene_query import objects_of, with_light_set
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
-from srbf.demo import Demo, Progress, Quality, Ready, Shown, bake_once, not_shown, reported, scene_file
+from srbf.demo import Demo, Progress, Quality, Shown, Steps, bake_once, reported, scene_file
 from srbf.demo.pictures import InCamera, Place, direct_light, shown_bytes
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.export.scene_mesh import write_scene_mesh
@@ -90,12 +90,10 @@ INSIDE = {
 }
 
 
-def run_demo_inside(
-    name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality = "draft", ready: Ready = not_shown
-) -> Demo:
+def inside_steps(name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality = "draft") -> Steps:
     """Build, trace, fit, then have Cycles render what it is measured by, and report and draw the scene `name` in `folder`.
 
-    Another run resumes it. `ready` is called once, as soon as the asset can be looked at: before Cycles renders a light.
+    Another run resumes it. It waits before Cycles renders a light.
     """
     scene = INSIDE[name]
     amount = scene.amount(quality)
@@ -109,7 +107,7 @@ def run_demo_inside(
     settings = scene.settings(receivers, quality)
     reporter.say(f"tracing form factors for {settings.width}x{settings.height} texels of {len(receivers)} objects")
     bake = with_light_set(Bake(blend, capture_folder, settings), reporter.say)
-    if bake_once(replace(bake, time_limit=0.0), reporter):
+    if bake_once(replace(bake, roles=("train",)), reporter):
         timings["form factors"] = clock() - started
     started = clock()
     asset = amount.fit.encode(Capture.open(capture_folder), FitRun(lambda done, total: progress(done, total, "fit"), say=reporter.say))
@@ -123,7 +121,7 @@ def run_demo_inside(
         bake_once(Bake(blend, folder / "view", view), reporter)
         return InCamera(asset, Capture.open(folder / "view"), direct)
 
-    ready(Shown(asset_folder, mesh, lambda: shown_bytes(in_camera().pictures(scene.places[:1])[0])))
+    yield Shown(asset_folder, mesh, lambda: shown_bytes(in_camera().pictures(scene.places[:1])[0]))
     started = clock()
     reporter.say(f"rendering {settings.holdout} held-out lights and {len(scene.places)} pictures with Cycles")
     if bake_once(bake, reporter):

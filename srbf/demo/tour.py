@@ -1,20 +1,19 @@
-"""The demo without a scene: three scenes one after the other, each with a page of one file, and an index that grows as they are made."""
+"""The demo without a scene: three scenes, each with a page of one file, and an index that grows; their errors are measured last."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import srbf
 from srbf.bake.run import Reporter
-from srbf.demo import Demo, Progress, Quality, Ready, Shown, run_demo, scene_script
-from srbf.demo.dome import run_demo_dome
+from srbf.demo import Progress, Quality, Shown, Steps, demo_steps, finished, scene_script
+from srbf.demo.dome import dome_steps
 from srbf.demo.index_page import Card, data_uri, index_page
-from srbf.demo.inside import run_demo_inside
+from srbf.demo.inside import inside_steps
 from srbf.errors import InputError, SrbfError
 from srbf.io import files
 from srbf.viewer.built_page import page_files
@@ -34,15 +33,15 @@ class Stop:
     title: str
     sentence: str
     opens: dict[str, Any]
-    make: Callable[[str, Path, Reporter, Progress, Quality, Ready], Demo]
+    steps: Callable[[str, Path, Reporter, Progress, Quality], Steps]
 
     def card(self) -> Card:
         """What the index says before anything is made."""
         return Card(self.title, self.sentence, self.opens)
 
 
-def _split(name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality, ready: Ready) -> Demo:
-    return run_demo(name, folder, None, reporter, progress, quality, "indirect", ready)
+def _split(name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality) -> Steps:
+    return demo_steps(name, folder, None, reporter, progress, quality, "indirect")
 
 
 def _sun(x: float, y: float, z: float, intensity: float) -> dict[str, Any]:
@@ -60,7 +59,7 @@ STOPS = (
         "Carry a light through a loft",
         "Drag the light through the door: its shadows stay crisp, and its bounces follow.",
         {"lights": [_point(3.3, 2.9, 1.5, 2)], "tone": "agx"},
-        run_demo_inside,
+        inside_steps,
     ),
     Stop(
         "caustics",
@@ -74,15 +73,16 @@ STOPS = (
         "Rake light over a coin",
         "Drag the light toward the rim of the disc: every letter and scratch of the photographed coin throws its shadow.",
         {"lights": [_sun(-0.62, 0.55, 0.56, 1.0)]},
-        run_demo_dome,
+        dome_steps,
     ),
 )
 
 
 def run_tour(folder: Path, reporter: Reporter, progress: Progress, quality: Quality = "draft") -> list[str]:
-    """Make the scenes of STOPS, each in a folder of its own; those after one that fails, too; returns a line for each failure.
+    """Make the scenes of STOPS, each in a folder of its own, then measure them; those after one that fails, too.
 
-    The index is there, and its path is said, as soon as the first scene can be opened. Finished scenes are kept, others resumed.
+    Returns a line for each failure. The index is there, and its path is said, as soon as the first scene can be opened. Finished scenes are
+    kept, others resumed.
     MissingLibraryError where the scenes or the built page are not installed; InputError where `folder` has scenes of another quality.
     """
     page_files()
@@ -92,7 +92,11 @@ def run_tour(folder: Path, reporter: Reporter, progress: Progress, quality: Qual
     tour = _Tour(folder, reporter, progress, quality)
     tour.check_quality()
     try:
-        return [line for number in range(len(STOPS)) if (line := tour.visit(number))]
+        for number in range(len(STOPS)):
+            tour.make(number)
+        for number in range(len(STOPS)):
+            tour.measure(number)
+        return [card.note for card in tour.cards if card.failed]
     finally:
         tour.end()
 
@@ -102,7 +106,8 @@ class _Tour:
 
     def __init__(self, folder: Path, reporter: Reporter, progress: Progress, quality: Quality) -> None:
         self._folder, self._reporter, self._progress, self._quality = folder, reporter, progress, quality
-        self._cards = [stop.card() for stop in STOPS]
+        self.cards = [stop.card() for stop in STOPS]
+        self._unmeasured: dict[int, Steps] = {}
         self._is_said = False
 
     def check_quality(self) -> None:
@@ -118,49 +123,64 @@ class _Tour:
 
     def end(self) -> None:
         """The index as it stays; scenes that an interrupt left say so."""
-        for card in self._cards:
+        for card in self.cards:
             if not card.is_done:
                 card.note = UNFINISHED
         self.write(grows=False)
 
     def write(self, grows: bool = True) -> None:
         """The index as it is now; says where it is once there is a link on it."""
-        files.write_text(self._folder / INDEX, index_page(self._cards, grows))
-        if not self._is_said and any(card.page for card in self._cards):
+        files.write_text(self._folder / INDEX, index_page(self.cards, grows))
+        if not self._is_said and any(card.page for card in self.cards):
             self._is_said = True
             self._reporter.say(f"open {self._folder / INDEX}: one scene can be relit now, the others follow on the same page")
 
-    def visit(self, number: int) -> str:
-        """Make a scene, or keep it where it is finished; why it failed, or nothing."""
-        stop, card = STOPS[number], self._cards[number]
+    def make(self, number: int) -> None:
+        """Make a scene until it can be opened, or keep it where it is finished."""
+        stop, card = STOPS[number], self.cards[number]
         kept = self._kept(stop)
         if kept is not None:
-            self._cards[number] = kept
+            self.cards[number] = kept
             self.write()
-            return ""
-        card.note, line = "Being made now.", ""
+            return
+        card.note = "Being made now."
         self.write()
 
         def say(told: str) -> None:
             self._reporter.say(f"{stop.name}: {told}")
 
-        reporter = Reporter(self._reporter.progress, say)
-        try:
-            made = stop.make(stop.name, self._folder / stop.name, reporter, self._progress, self._quality, partial(self._show, stop, card))
-        except Exception as error:  # noqa: BLE001  whatever it is, the other scenes can still be made
-            line = f"{stop.name} failed: {_in_one_line(error)}"
-            card.note, card.failed, card.is_done = line, True, True
-            self._reporter.say(line)
-        else:
+        with self._failing(stop, card):
+            steps = stop.steps(stop.name, self._folder / stop.name, Reporter(self._reporter.progress, say), self._progress, self._quality)
+            self._show(stop, card, next(steps))
+            self._unmeasured[number] = steps
+        self.write()
+
+    def measure(self, number: int) -> None:
+        """The errors of a scene that was made in this run."""
+        stop, card, steps = STOPS[number], self.cards[number], self._unmeasured.pop(number, None)
+        if steps is None:
+            return
+        card.note = "Its errors are being measured."
+        self.write()
+        with self._failing(stop, card):
+            made = finished(steps)
             card.note, card.is_done = f"{made.error[0].upper()}{made.error[1:]}.", True
             files.write_json(self._folder / stop.name / KEPT, self._record(card))
         self.write()
-        return line
+
+    @contextmanager
+    def _failing(self, stop: Stop, card: Card) -> Iterator[None]:
+        """Whatever fails in here, the other scenes can still be made."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001
+            card.note, card.failed, card.is_done = f"{stop.name} failed: {_in_one_line(error)}", True, True
+            self._reporter.say(card.note)
 
     def _show(self, stop: Stop, card: Card, shown: Shown) -> None:
         """Write the page of a scene, then its picture on the index."""
         files.write_text(self._folder / f"{stop.name}.html", single_file(contents_of([shown.asset], None, shown.mesh)))
-        card.page, card.note = f"{stop.name}.html", "Its errors are being measured."
+        card.page, card.note = f"{stop.name}.html", "Its errors are measured once all scenes can be opened."
         self.write()
         card.picture = data_uri(shown.picture())
         self.write()

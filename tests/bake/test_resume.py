@@ -103,6 +103,22 @@ def job(blend, folder: Path, **changes: object) -> Bake:
     return Bake(blend("occluder"), folder, BakeSettings(Receiver("lightmap", "Plane"), **settings))
 
 
+def test_lights_of_some_roles_first_give_the_bits_of_one_bake(blend, tmp_path: Path) -> None:
+    """Train lights alone are a capture that can be fitted; then the others are rendered, and those not again."""
+    whole, folder = tmp_path / "whole", tmp_path / "capture"
+    tested = {"samples": 2, "holdout": 2, "holdout_samples": 4}
+    job(blend, whole, **tested).run(Reporter())
+    told: list[tuple[float, float, str]] = []
+    first = replace(job(blend, folder, **tested), roles=("train",))
+    assert first.run(Reporter(lambda *progress: told.append(progress)))
+    assert {light.role for light in Capture.open(folder).lights} == {"train"} and len(Capture.open(folder).lights) == 4
+    assert told[-1] == (8, 8, "pass 1: light 4 of 4")
+    rendered = [(path, path.stat().st_mtime_ns) for path in sorted(folder.glob("lights/*.exr"))]
+    assert job(blend, folder, **tested).run(Reporter())
+    assert contents(folder) == contents(whole) and not job(blend, folder, **tested).run(Reporter())
+    assert rendered == [(path, path.stat().st_mtime_ns) for path, _ in rendered]
+
+
 def test_samples_added_later_give_the_bits_of_one_bake(blend, tmp_path: Path) -> None:
     """2 samples, then 8: as 8 from the start, manifest and all; without the sums that is refused."""
     whole, folder = tmp_path / "whole", tmp_path / "capture"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from srbf import demo
 from srbf.asset import Asset
 from srbf.cli import app
-from srbf.demo import SCENES, inside
+from srbf.demo import SCENES, Steps, inside
 from srbf.demo.inside import INSIDE, Amount
 from srbf.demo.pictures import bilinear
 from srbf.methods.surface_changes import Surfaces
@@ -74,9 +74,17 @@ def test_a_loft_from_script_to_picture(tmp_path: Path, monkeypatch: pytest.Monke
     for name in ("PLACED", "MOST_PLACED", "NEAR", "SPOTS"):
         monkeypatch.setattr(transfer_basis, name, 40)
     seen: list[list[Path]] = []
-    shown = partial(inside.run_demo_inside, ready=lambda own: seen.append([*(tmp_path / "capture" / "lights").iterdir(), own.asset]))
+    steps = inside.inside_steps
+
+    def watched(*arguments: Any) -> Steps:
+        made = steps(*arguments)
+        shown = next(made)
+        seen.append([*(tmp_path / "capture" / "lights").iterdir(), shown.asset])
+        yield shown
+        return (yield from made)
+
     with monkeypatch.context() as patch:
-        patch.setattr(inside, "run_demo_inside", shown)
+        patch.setattr(inside, "inside_steps", watched)
         done = CliRunner().invoke(app, ["demo", "--scene", "loft", "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert seen == [[tmp_path / "asset"]], "it can be looked at before Cycles renders a light"

@@ -17,7 +17,7 @@ from srbf import demo
 from srbf.asset import Asset
 from srbf.bake.run import Reporter
 from srbf.cli import app
-from srbf.demo import Demo, Progress, Quality, Ready, Shown, dome, tour
+from srbf.demo import Demo, Progress, Quality, Shown, Steps, dome, finished, tour
 from srbf.demo.dome import DOMES, Photographs
 from srbf.demo.index_page import Card, address, data_uri, index_page
 from srbf.demo.photographs import Dome
@@ -28,19 +28,21 @@ PICTURE = np.full((6, 8, 3), 90, np.uint8)
 
 
 class Made:
-    """Scenes that are made in no time: `failing` ones fail, early or once they were shown; `seen` is the index at each of these moments."""
+    """Scenes that are made in no time: `failing` ones fail, early or once they were shown; `begun` and `seen` are the index then."""
 
     def __init__(self, failing: dict[str, str]) -> None:
         self.failing = failing
         self.made: list[str] = []
+        self.begun: list[str] = []
         self.seen: list[str] = []
 
-    def __call__(self, name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality, ready: Ready) -> Demo:
+    def __call__(self, name: str, folder: Path, reporter: Reporter, progress: Progress, quality: Quality) -> Steps:
         folder.mkdir(exist_ok=True)
         self.made.append(name)
+        self.begun.append((folder.parent / tour.INDEX).read_text())
         if self.failing.get(name) == "early":
             raise BakeError("expected a scene,\nfound none")
-        ready(Shown(folder / "asset", None, lambda: PICTURE))
+        yield Shown(folder / "asset", None, lambda: PICTURE)
         self.seen.append((folder.parent / tour.INDEX).read_text())
         if self.failing.get(name) == "late":
             raise RuntimeError("no Cycles")
@@ -51,7 +53,7 @@ class Made:
 def scenes(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Made]:
     def put(**failing: str) -> Made:
         made = Made(failing)
-        monkeypatch.setattr(tour, "STOPS", tuple(replace(stop, make=made) for stop in tour.STOPS))
+        monkeypatch.setattr(tour, "STOPS", tuple(replace(stop, steps=made) for stop in tour.STOPS))
         for name, fake in (("page_files", dict), ("contents_of", lambda *_: {}), ("single_file", lambda _: "<html>")):
             monkeypatch.setattr(tour, name, fake)
         monkeypatch.setattr(tour, "scene_script", Path)
@@ -64,16 +66,15 @@ def links(index: str) -> list[str]:
     return [unquote(link).partition("#")[0] for link in re.findall(r'href="([^"]+\.html[^"]*)"', index)]
 
 
-def test_the_index_grows_by_a_scene_at_a_time(scenes: Callable[..., Made], tmp_path: Path) -> None:
+def test_all_scenes_can_be_opened_before_one_is_measured(scenes: Callable[..., Made], tmp_path: Path) -> None:
     made, said = scenes(), list[str]()
     assert tour.run_tour(tmp_path, Reporter(say=said.append), lambda *_: None) == []
     assert made.made == ["loft", "caustics", "coin"]
-    assert [links(index) for index in made.seen] == [
-        ["loft.html"],
-        ["loft.html", "caustics.html"],
-        ["loft.html", "caustics.html", "coin.html"],
-    ]
-    assert "Not begun yet." in made.seen[0] and "Its errors are being measured." in made.seen[0]
+    assert [links(index) for index in made.begun] == [[], ["loft.html"], ["loft.html", "caustics.html"]]
+    assert "Being made now." in made.begun[0] and made.begun[0].count("Not begun yet.") == 2
+    assert [links(index) for index in made.seen] == [["loft.html", "caustics.html", "coin.html"]] * 3
+    assert "Its errors are being measured." in made.seen[0] and "Errors of loft." in made.seen[1]
+    assert made.seen[0].count("Its errors are measured once all scenes can be opened.") == 2
     assert all('http-equiv="refresh"' in index for index in made.seen)
     assert [line for line in said if line.startswith("open ")] == [
         f"open {tmp_path / 'index.html'}: one scene can be relit now, the others follow on the same page"
@@ -108,17 +109,17 @@ def test_what_fails_leaves_the_other_scenes(scenes: Callable[..., Made], tmp_pat
 
 
 def test_an_interrupted_tour_says_so(scenes: Callable[..., Made], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(*_: object) -> Demo:
+    def interrupt(*_: object) -> Steps:
         raise KeyboardInterrupt
 
     scenes()
-    stops = (tour.STOPS[0], replace(tour.STOPS[1], make=interrupt), tour.STOPS[2])
+    stops = (tour.STOPS[0], replace(tour.STOPS[1], steps=interrupt), tour.STOPS[2])
     monkeypatch.setattr(tour, "STOPS", stops)
     with pytest.raises(KeyboardInterrupt):
         tour.run_tour(tmp_path, Reporter(), lambda *_: None)
     index = (tmp_path / "index.html").read_text()
     assert 'http-equiv="refresh"' not in index and links(index) == ["loft.html"]
-    assert index.count("Not finished: the same command resumes it.") == 2 and "Being made now." not in index
+    assert index.count("Not finished: the same command resumes it.") == 3 and "Being made now." not in index
 
 
 def test_a_card_names_what_its_page_opens_with() -> None:
@@ -161,10 +162,11 @@ def test_a_coin_from_photographs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(dome, "PAGE_FIT", replace(demo.PAGE_FIT, clusters=2, components=4))
     for module in (canvas, abrdf_mosaic):
         monkeypatch.setattr(module, "DPI", 40)
-    shown: list[np.ndarray] = []
-    made = dome.run_demo_dome("coin", tmp_path, Reporter(), lambda *_: None, ready=lambda own: shown.append(own.picture()))
+    steps = dome.dome_steps("coin", tmp_path, Reporter(), lambda *_: None)
+    shown = next(steps).picture()
+    made = finished(steps)
     assert len(list((tmp_path / "photographs").glob("*.jpg"))) == 11
-    assert shown[0].shape == (24, 24, 3) and shown[0].dtype == np.uint8 and shown[0].max() > 100
+    assert shown.shape == (24, 24, 3) and shown.dtype == np.uint8 and shown.max() > 100
     assert 0 < Asset.open(made.assets[0]).manifest["error"]["holdout"]["relative_rmse"] < 1
     assert made.page.is_file()
     assert made.error.startswith("2 held-out photographs: relative RMSE ")
