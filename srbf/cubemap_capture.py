@@ -13,6 +13,7 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float, Float32, Int
 from srbf.capture import Capture
 from srbf.captured_light import ROLES, CapturedLight, Role
+from srbf.compute.full_precision import channel_products
 from srbf.cubemap import Cubemap
 from srbf.cubemap_transport import CubemapTransport, TestedTransport, read_tested, read_transport
 from srbf.errors import ManifestError
@@ -143,7 +144,7 @@ class CubemapCapture(Capture):
         """What gloss reflects of single directions straight up."""
         cosines = self._transport.cosines(rows, columns)
         shapes, weights = self._bounces_from_above[rows], self._transport.weights[:, columns]
-        found = np.stack([shapes[:, :, c] @ weights[:, :, c] for c in range(3)], axis=2)
+        found = channel_products(shapes, weights)
         row, column = np.nonzero(cosines)
         found[row, column] += self.receiver_gloss.from_above(rows[row], cosines[row, column].astype(np.float64))
         return found

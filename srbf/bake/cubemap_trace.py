@@ -16,6 +16,8 @@ from srbf.arrays import Float32, Float64, Int
 from srbf.bake.surface_checks import warn_of_duplicates, warn_of_unlit
 from srbf.capture import Capture
 from srbf.channels import GLOSS
+from srbf.compute.allocator import freed_memory_kept
+from srbf.compute.full_precision import channel_products
 from srbf.cubemap import Cubemap
 from srbf.cubemap_transport import BOUNCES_FILE, TESTED_FILE, VISIBILITY_FILE, stored_arrays, write_arrays
 from srbf.errors import InputError
@@ -218,8 +220,7 @@ class _Stages:
             seen = np.unpackbits(bits, axis=1, count=len(missing))
             direct = seen * np.maximum(tracer.normals @ tracer.directions.T, 0)
             lit = light_on_surfels(self.surfels, directions[missing], self.occluders)[0]
-            transfer = bounces["from_surfels"].astype(np.float32)
-            weights = np.stack([transfer[:, :, c] @ lit for c in range(3)], axis=2)
+            weights = channel_products(bounces["from_surfels"].astype(np.float32), np.repeat(lit[:, :, None], 3, axis=2))
             shapes = bounces["shapes"].astype(np.float32)
             if unknown:
                 write_arrays(self.capture.folder / TESTED_FILE, self.key, bits=bits, weights=weights.transpose(1, 0, 2))
@@ -265,6 +266,7 @@ class _Stages:
         return image.reshape(self.capture.height, self.capture.width, 3) * self.receivers.reflectance()
 
 
+@freed_memory_kept()
 def trace_cubemap(
     capture: Capture,
     surfels: Surfels,

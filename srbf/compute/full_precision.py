@@ -1,4 +1,4 @@
-"""Tables of halves as the processor multiplies them, converted once: numpy has no products of halves."""
+"""Tables as the processor multiplies them: halves converted once, for numpy has no products of those, and one channel of several copied."""
 
 from __future__ import annotations
 
@@ -31,3 +31,9 @@ def times_columns(matrix: Float32[ndarray, "R N"], columns: Float32[ndarray, "N 
     if columns.shape[1] > FEW:
         return matrix @ columns
     return np.stack([matrix @ np.ascontiguousarray(column) for column in columns.T], axis=1)
+
+
+def channel_products(left: Float32[ndarray, "R N C"], right: Float32[ndarray, "N k C"]) -> Float32[ndarray, "R k C"]:
+    """The matrix product of each channel. numpy takes a tenth of the speed where channels are apart in memory: they are copied."""
+    channels = zip(np.moveaxis(left, 2, 0), np.moveaxis(right, 2, 0), strict=True)
+    return np.stack([np.ascontiguousarray(a) @ np.ascontiguousarray(b) for a, b in channels], axis=2)

@@ -16,6 +16,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
+from srbf.compute.threads import each, one_blas_thread
 from srbf.encode.position_table import FILES, PositionTable, position_table
 from srbf.light_domain.cloud import isotropic
 from srbf.lights import Light, PointLight, refuse_named
@@ -97,8 +98,15 @@ class LightsInsideMaps(LightTableMaps):
     @classmethod
     def at_places(cls, asset: Asset, places: Float64[ndarray, "b 3"]) -> Float64[ndarray, "b F 3"]:
         """Weights of white point lights of unit irradiance at 1 m."""
-        lights = (PointLight((float(x), float(y), float(z)), falloff="inverse-square") for x, y, z in places)
-        return np.stack([cls.projected_weights(asset, [light]) for light in lights])
+        lights = [PointLight((x, y, z), falloff="inverse-square") for x, y, z in places.tolist()]
+        found = np.empty((len(lights), len(asset.tables["light_values"]), 3))
+
+        def measure(number: int) -> None:
+            found[number] = cls.projected_weights(asset, lights[number : number + 1])
+
+        with one_blas_thread():
+            each(measure, len(lights))
+        return found
 
 
 def _from_table(asset: Asset, light: Light) -> Float64[ndarray, "F 3"]:

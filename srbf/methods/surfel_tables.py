@@ -15,7 +15,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
-from srbf.compute.full_precision import by_channel, times_columns
+from srbf.compute.full_precision import by_channel, channel_products, times_columns
 from srbf.encode.table_steps import ROUNDING_NOISE, power_of_two
 from srbf.methods.light_table_maps import pack_table, scaled_halves
 
@@ -83,10 +83,10 @@ def weights_of_shapes(asset: Asset, irradiance: Float64[ndarray, "S ... 3"]) -> 
         first = times_columns(by_channel(asset.tables[GATHER])[0], reflected) * np.float32(asset.manifest[GATHER]["scale"])
         first = first.reshape(len(first), -1, 3)
         later, scale = by_channel(asset.tables[SERIES]), np.float32(asset.manifest[SERIES]["scale"])
-        weights = np.stack([first[..., c] + scale * (later[c] @ first[..., c]) for c in range(3)], axis=2)
+        weights = first + scale * channel_products(later.transpose(1, 2, 0), first)
     else:
         table, scale = by_channel(asset.tables[TRANSFER]), np.float32(asset.manifest[TRANSFER]["scale"])
-        weights = scale * np.stack([table[c] @ received[..., c] for c in range(3)], axis=2)
+        weights = scale * channel_products(table.transpose(1, 2, 0), received)
     return weights.astype(np.float64).reshape(len(weights), *irradiance.shape[1:])
 
 

@@ -14,6 +14,7 @@ from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
 from srbf.captured_light import NOWHERE, CapturedLight
+from srbf.compute.allocator import freed_memory_kept
 from srbf.encode.table_steps import steps_by_cluster, steps_by_column
 from srbf.errors import InputError
 from srbf.io.image import Encoding
@@ -134,6 +135,7 @@ class Transfer(LightsInsideMaps):
         if self.rank != "auto" and not self.rank >= 1:
             raise InputError(f"expected `rank` auto or 1 or more, found {self.rank}")
 
+    @freed_memory_kept()
     def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
         """Shapes from the capture's form factors, then components of the shapes in clusters.
 

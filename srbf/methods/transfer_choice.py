@@ -55,7 +55,7 @@ class Judges:
         unused = placed_of(len(operator.cells.places))  # by `training_light`, from here on
         places = capture.positions(validation) if validation else free[unused if len(free) > unused else 0 :][:LIGHTS]
         lights = [PointLight((x, y, z), falloff="inverse-square") for x, y, z in places.tolist()]
-        irradiance = np.stack([received.on_patches(light)[:, 0] for light in lights], axis=1).astype(np.float32)
+        irradiance = received.white_on_patches(lights)
         texels = sampled_texels(capture, TEXELS)
         factors = operator.receivers[texels]
         weight = np.ones((len(texels), 1, 3), np.float32)

@@ -64,6 +64,7 @@ class Bounces:
 
 def summed_series(feedback: Float[ndarray, "r r"], first: Float[ndarray, "r n"], terms: int | None) -> Float[ndarray, "r n"]:
     """sum over k < `terms` of feedback^k first; None: of all k."""
+    feedback, first = np.ascontiguousarray(feedback), np.ascontiguousarray(first)  # one channel of several: BLAS takes no such strides
     if terms is None or terms >= SERIES:
         return np.linalg.solve(np.eye(len(feedback), dtype=feedback.dtype) - feedback, first)
     total = last = first if terms else np.zeros_like(first)
@@ -84,13 +85,14 @@ def reciprocal(form_factors: ndarray | csr_array, areas: Float32[ndarray, " S"])
 
     Rows keep their sums, what of each hemisphere the surfels fill, so that no light is lost: flux is scaled by D F D, a few rounds.
     """
-    area = np.maximum(areas.astype(np.float64), 1e-30)
+    area = np.maximum(areas, 1e-30).astype(np.float32)
     flux = area[:, None] * form_factors
-    wanted = flux.sum(axis=1)
-    flux = (flux + flux.T) / 2
-    scale = np.ones(len(area))
+    wanted = flux.sum(axis=1, dtype=np.float64)
+    flux = flux + flux.T  # twice the mean
+    scale = np.full(len(area), np.sqrt(0.5))
     for _ in range(ROUNDS):
-        own = scale * (flux @ scale)
+        own = scale * (flux @ scale.astype(np.float32))
         scale *= np.sqrt(np.divide(wanted, own, out=np.ones_like(own), where=own > 0))
-    result = flux * scale * (scale / area)[:, None]
-    return result.astype(np.float32)
+    flux *= scale.astype(np.float32)
+    flux *= (scale / area).astype(np.float32)[:, None]
+    return flux

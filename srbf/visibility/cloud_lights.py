@@ -64,8 +64,8 @@ class CloudLights:
 
     def received(self, places: Float64[ndarray, "n 3"]) -> Float64[ndarray, "n K"]:
         """Mean irradiance on every patch under a white point light of unit irradiance at 1 m at each place."""
-        lights = [PointLight((float(x), float(y), float(z)), falloff="inverse-square") for x, y, z in places]
-        return np.stack([self.on_patches(light)[:, 0] for light in lights])
+        lights = [PointLight((x, y, z), falloff="inverse-square") for x, y, z in places.tolist()]
+        return self._tracer.white_on_patches(lights).T.astype(np.float64)
 
     @functools.cached_property
     def _tracer(self) -> ReceivedLight:

@@ -23,28 +23,30 @@ from srbf.visibility.transfer_operator import POINTS, SURFEL_RAYS, leave_gaps_ou
 
 LEFT_OUT = 0.01  # of the receivers' bounces under all directions, rms, that the shapes leave out
 MOST_RANK = 256
-JUDGES, JUDGING = 1024, 1024  # receivers that the shapes are made for, and rays from each
+JUDGING = 1024  # rays from each of the receivers that the shapes are made for
 SPARSE = 0.1  # share of the surfels that exchange light, below which products leave out the others
 BLOCK = 1 << 14  # receivers between two reports of progress
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Rays from each receiver and from each surfel, and whether every direction of the cubemap is traced, or one of half its side."""
+    """Rays from each receiver and from each surfel, whether every direction of the cubemap is traced, or one of half its side, and for
+    how many receivers at most the shapes are made."""
 
     receiver_rays: int
     surfel_rays: int
     every_direction: bool
+    judges: int
 
     @staticmethod
     def full(receivers: int) -> Effort:
         """As a bake of surfels has them."""
-        return Effort(rays_of_each(receivers), SURFEL_RAYS, True)
+        return Effort(rays_of_each(receivers), SURFEL_RAYS, True, 1024)
 
     @staticmethod
     def sparse() -> Effort:
         """A quarter of the directions, since bounces are smooth [Huang2010, section 4.2], and a few rays to each receiver."""
-        return Effort(256, 512, False)
+        return Effort(256, 512, False, 512)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +103,9 @@ def traced(
     """Bounces at the receivers whose rays start at `origins`; `most_bounces`: reflections at most, None: all of them; `gloss`: with
     `harmonics`, by the same rays.
 
-    The shapes are the leading axes of what JUDGES receivers get from all directions: T = G K e, G their form factors, K the bounces, e the
-    direct light on the surfels. With V (N, r) the right singular vectors, shapes = G K e V and weights = V^T, so that no product has S N S
-    terms.
+    The shapes are the leading axes of what some receivers, the judges, get from all directions: T = G K e, G their form factors, K the
+    bounces, e the direct light on the surfels. With V (N, r) the right singular vectors, shapes = G K e V and weights = V^T, so that no
+    product has S N S terms.
     """
     from scipy.sparse import csr_array
 
@@ -119,7 +121,7 @@ def traced(
     known = cubemap if effort.every_direction or cubemap.side < 4 else Cubemap(cubemap.side // 2)
     lit, more = light_on_surfels(surfels, known.directions, occluders)
     rays += more
-    judges = np.random.default_rng(seed).permutation(count)[:JUDGES]
+    judges = np.random.default_rng(seed).permutation(count)[: effort.judges]
     of_each = origins.weights.shape[1]
     per_point = max(1, effort.receiver_rays // of_each)
     judged = form_factors(surfels, _at(origins, judges), JUDGING, seed + 2).toarray()

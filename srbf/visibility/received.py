@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64, Int
+from srbf.compute.threads import each
 from srbf.io.scene_glb import read_triangles
 from srbf.light_geometry import environment_samples, soft_cone
 from srbf.light_linking import Objects
@@ -98,6 +99,16 @@ class ReceivedLight:
     def on_patches(self, light: Light) -> Float64[ndarray, "K 3"]:
         """The mean irradiance of every patch."""
         return patch_means(self._cells, self.irradiance(light))
+
+    def white_on_patches(self, lights: Sequence[Light]) -> Float32[ndarray, "K n"]:
+        """The mean irradiance of every patch under each of n white lights, which are taken in turn by one thread per core."""
+        found = np.empty((self._cells.patch_count, len(lights)), np.float32)
+
+        def measure(number: int) -> None:
+            found[:, number] = self.on_patches(lights[number])[:, 0]
+
+        each(measure, len(lights))
+        return found
 
     def _of_point(self, light: PointLight) -> Float64[ndarray, "N _"]:
         """cos a0^2 / r^2 of what sees the light, or a0 / r for a linear falloff; times a spot's cone and a profile."""

@@ -47,7 +47,8 @@ class SurfelEffects:
         """
         rng = np.random.default_rng(seed)
         signs = random_signs(rng, basis.shapes.shape[1], EFFECT_SUMS) * basis.sizes[:, None]
-        effect = np.concatenate([basis.transfer[:, :, c].T @ signs for c in range(3)], axis=1) / np.float32(np.sqrt(3))  # (S, 192)
+        by_color = [np.ascontiguousarray(basis.transfer[:, :, c].T) @ signs for c in range(3)]
+        effect = np.concatenate(by_color, axis=1) / np.float32(np.sqrt(3))  # (S, 192)
         pictures = np.linalg.norm(effect.T @ irradiance, axis=0)
         unit = np.sqrt(irradiance.shape[1]) * np.maximum(pictures, max(1e-6 * float(pictures.max(initial=0)), 1e-30))
         light = (irradiance / unit.astype(np.float32)) @ random_signs(rng, irradiance.shape[1], LIGHT_SUMS)

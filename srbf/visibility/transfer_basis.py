@@ -93,7 +93,7 @@ def training_light(operator: TransferOperator, received: ReceivedLight, free: Fl
         dx, dy, dz = (direction / np.linalg.norm(direction)).tolist()
         outer = float(rng.uniform(*CONE))
         lights.append(SpotLight((x, y, z), falloff="inverse-square", direction=(dx, dy, dz), inner=0.9 * outer, outer=outer))
-    inside = np.stack([received.on_patches(light)[:, 0] for light in lights], axis=1).astype(np.float32)
+    inside = received.white_on_patches(lights)
     return inside if operator.environment is None else np.concatenate([inside, operator.environment.parts()], axis=1)
 
 

@@ -51,7 +51,7 @@ def apart(found: np.ndarray, true: np.ndarray) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("most", [1, 4, None])
 def test_shapes_times_weights_are_the_bounces(surfels: Surfels, most: int | None) -> None:
-    found, mixture = traced(surfels, ORIGINS, CUBEMAP, OCCLUDERS, most, Effort(2048, 1024, True))
+    found, mixture = traced(surfels, ORIGINS, CUBEMAP, OCCLUDERS, most, Effort(2048, 1024, True, 1024))
     true = expected(surfels, CUBEMAP.directions, most)
     assert apart(np.einsum("pr,rnc->pnc", found.shapes, found.weights), true) < NOISE
     others = CUBEMAP.directions[::7] @ np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])
