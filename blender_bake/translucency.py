@@ -14,6 +14,7 @@ KNOTS = 8
 CLEAR: Curve = [(1.0, 1.0, 1.0)] * KNOTS
 FINE = 4  # ramp stops between two knots of a probe
 GAUSS_NEWTON = 12
+MOST_TEXELS = 1 << 17  # of a material under a light, that its curve is fitted to
 SMOOTH = 1e-3  # weight of a curve's second differences
 BRIGHTEST = 8.0  # a wall may concentrate light, up to this
 
@@ -118,35 +119,30 @@ def fit_transmittances(
     gets d prod m(c). With ln m = sum_k theta_k hat_k(c) that is d exp(sum_k theta_k F_k), where F_k = sum over walls of hat_k(c) is
     read off a bake whose walls have the transmittance 2^-hat_k.
     """
-    lights = list(aims)
-    transmittances: dict[str, Curve] = {}
-    for one in translucent:
-        for other in translucent:
-            other.on(CLEAR)
-        walls, whole, passed = [], [], []
-        for aim in lights:
-            aim()
+    found: dict[str, list[tuple[np.ndarray, ...]]] = {one.name: [] for one in translucent}
+    for aim in aims if translucent else ():
+        aim()
+        for one in translucent:
             one.on(CLEAR)
-            clear = direct()
+        clear = direct()
+        for one in translucent:
             features = []
             for first in range(0, KNOTS, 3):
                 one.on(_probe(first))
                 features.append(direct())
             one.off()
             true = direct()
+            one.on(CLEAR)
             lit = (clear > 0).all(axis=2)
             for image in features:
                 lit &= (image > 0).all(axis=2)
             stacked = np.concatenate([np.log2(clear[lit] / image[lit]) for image in features], axis=1)[:, :KNOTS]
-            met = stacked.sum(axis=1) > 0.5
-            walls.append(stacked[met])
-            whole.append(clear[lit][met])
-            passed.append(true[lit][met])
-        transmittances[one.name] = _curve(np.concatenate(walls), np.concatenate(whole), np.concatenate(passed)) if lights else CLEAR
-        one.off()
+            met = np.flatnonzero(stacked.sum(axis=1) > 0.5)
+            met = met[:: -(-len(met) // MOST_TEXELS) or 1]
+            found[one.name].append((stacked[met], clear[lit][met], true[lit][met]))
     for one in translucent:
         one.off()
-    return transmittances
+    return {name: _curve(*map(np.concatenate, zip(*parts, strict=True))) if parts else CLEAR for name, parts in found.items()}
 
 
 def _probe(first: int) -> Curve:

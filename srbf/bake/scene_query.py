@@ -21,6 +21,7 @@ from srbf.bake.run import Bake, require_scene
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings, LightSet
 from srbf.bake.surface_checks import require_surfels, warn_of_fewer, warn_of_surfaces
 from srbf.bake.worker import Worker
+from srbf.compute.allocator import freed_memory_kept
 from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
@@ -198,6 +199,7 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
     return replace(bake, settings=replace(settings, light_set=known))
 
 
+@freed_memory_kept()
 def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Callable[[str], None], distant: bool = False) -> CloudSet:
     """The set with free places and patches, from the facts of its scene; `distant`: no light of it is inside the scene."""
     arrays, places = found["arrays"], found["places"]

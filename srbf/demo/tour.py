@@ -92,10 +92,11 @@ def run_tour(folder: Path, reporter: Reporter, progress: Progress, quality: Qual
     tour = _Tour(folder, reporter, progress, quality)
     tour.check_quality()
     try:
-        for number in range(len(STOPS)):
-            tour.make(number)
-        for number in range(len(STOPS)):
-            tour.measure(number)
+        for step in (tour.make, tour.draw, tour.measure):
+            for number in range(len(STOPS)):
+                step(number)
+            if step == tour.make:
+                reporter.say("all scenes that were made can be opened; next their errors are measured")
         return [card.note for card in tour.cards if card.failed]
     finally:
         tour.end()
@@ -107,7 +108,7 @@ class _Tour:
     def __init__(self, folder: Path, reporter: Reporter, progress: Progress, quality: Quality) -> None:
         self._folder, self._reporter, self._progress, self._quality = folder, reporter, progress, quality
         self.cards = [stop.card() for stop in STOPS]
-        self._unmeasured: dict[int, Steps] = {}
+        self._opened: dict[int, tuple[Shown, Steps]] = {}
         self._is_said = False
 
     def check_quality(self) -> None:
@@ -151,15 +152,26 @@ class _Tour:
 
         with self._failing(stop, card):
             steps = stop.steps(stop.name, self._folder / stop.name, Reporter(self._reporter.progress, say), self._progress, self._quality)
-            self._show(stop, card, next(steps))
-            self._unmeasured[number] = steps
+            shown = next(steps)
+            page = single_file(contents_of([shown.asset], None, shown.mesh))
+            files.write_text(self._folder / f"{stop.name}.html", page)
+            card.page, card.note = f"{stop.name}.html", "Its errors are measured once all scenes can be opened."
+            self._opened[number] = shown, steps
         self.write()
+
+    def draw(self, number: int) -> None:
+        """The picture of a scene that was made in this run."""
+        if number in self._opened:
+            with self._failing(STOPS[number], self.cards[number]):
+                self.cards[number].picture = data_uri(self._opened[number][0].picture())
+            self.write()
 
     def measure(self, number: int) -> None:
         """The errors of a scene that was made in this run."""
-        stop, card, steps = STOPS[number], self.cards[number], self._unmeasured.pop(number, None)
-        if steps is None:
+        stop, card = STOPS[number], self.cards[number]
+        if number not in self._opened or card.failed:
             return
+        _, steps = self._opened[number]
         card.note = "Its errors are being measured."
         self.write()
         with self._failing(stop, card):
@@ -176,14 +188,6 @@ class _Tour:
         except Exception as error:  # noqa: BLE001
             card.note, card.failed, card.is_done = f"{stop.name} failed: {_in_one_line(error)}", True, True
             self._reporter.say(card.note)
-
-    def _show(self, stop: Stop, card: Card, shown: Shown) -> None:
-        """Write the page of a scene, then its picture on the index."""
-        files.write_text(self._folder / f"{stop.name}.html", single_file(contents_of([shown.asset], None, shown.mesh)))
-        card.page, card.note = f"{stop.name}.html", "Its errors are measured once all scenes can be opened."
-        self.write()
-        card.picture = data_uri(shown.picture())
-        self.write()
 
     def _kept(self, stop: Stop) -> Card | None:
         """The card of a scene that is finished and whose page is there."""

@@ -7,11 +7,14 @@ a side that no free place sees has no cell: what lies under a box or outside a c
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.compute.threads import each
+from srbf.vectors import cross, lengths
 from srbf.visibility.embree import EmbreeTriangles
 
 OFFSET = 1e-4  # of the scene's size: between a surface and the end of a ray to it
@@ -31,26 +34,25 @@ class Fragments:
     corners: Float32[ndarray, "T 3 3"]
     albedo: Float32[ndarray, "T 3"]
 
-    @property
+    @cached_property
     def normals(self) -> Float64[ndarray, "T 3"]:
         """Unit normals; 0 of triangles without area."""
-        cross = self._cross
-        return cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-30)
+        return self._cross / np.maximum(lengths(self._cross)[:, None], 1e-30)
 
-    @property
+    @cached_property
     def areas(self) -> Float64[ndarray, " T"]:
         """In square meters."""
-        return np.linalg.norm(self._cross, axis=1) / 2
+        return lengths(self._cross) / 2
 
-    @property
+    @cached_property
     def centers(self) -> Float64[ndarray, "T 3"]:
         """Centroids, m."""
         return self.corners.mean(axis=1, dtype=np.float64)
 
-    @property
+    @cached_property
     def _cross(self) -> Float64[ndarray, "T 3"]:
         corners = self.corners.astype(np.float64)
-        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
     def both_sides(self) -> Fragments:
         """Every triangle twice, the second time turned over."""
@@ -125,13 +127,17 @@ def lit(
     scale = OFFSET * float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     starts = (points + scale * normals).astype(np.float32)
     offsets = np.einsum("nk,nk->n", points, normals)
-    for begin in range(0, len(points), max(1, RAYS // max(1, len(free)))):
-        part = slice(begin, begin + max(1, RAYS // max(1, len(free))))
+    size = max(1, RAYS // max(1, len(free)))
+
+    def test(number: int) -> None:
+        part = slice(number * size, (number + 1) * size)
         row, column = np.nonzero(normals[part] @ free.T > offsets[part, None])
         vector = free[column] - starts[part][row]
-        distance = np.linalg.norm(vector, axis=1)
+        distance = lengths(vector)
         blocked = occluders.occluded(starts[part][row], vector / np.maximum(distance, 1e-30)[:, None], distance)
         result[part][row[~blocked], column[~blocked]] = True
+
+    each(test, -(-len(points) // size))
     return result
 
 
@@ -194,11 +200,11 @@ def grouped_cells(fragments: Fragments, owner: Int[ndarray, " T"]) -> Cells:
 def contain(fragments: Fragments, points: Float64[ndarray, "T 3"]) -> Bool[ndarray, " T"]:
     """Whether each fragment has its point, within FLAT of its size."""
     corners, normals = fragments.corners.astype(np.float64), fragments.normals
-    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     to_point = points[:, None] - corners  # (T, 3, 3)
     edges = np.roll(corners, -1, axis=1) - corners
-    inward = np.cross(normals[:, None], edges)
-    inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-30)
+    longest = lengths(edges).max(axis=1)
+    inward = cross(normals[:, None], edges)
+    inward /= np.maximum(lengths(inward)[..., None], 1e-30)
     inside = (np.einsum("tek,tek->te", inward, to_point) >= -FLAT * longest[:, None]).all(axis=1)
     return inside & (np.abs(np.einsum("tk,tk->t", normals, to_point[:, 0])) <= FLAT * longest)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.vectors import lengths
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.emitting_sides import lighting_others
 from srbf.visibility.hemisphere import cosine_directions
@@ -242,7 +243,7 @@ def cut_at_walls(surfaces: Fragments, occluders: EmbreeTriangles, gap: float) ->
             for corner in range(3):
                 vector = 0.98 * (corners[:, corner] - own.centers)
                 hidden |= under != covered(own.centers + vector, side * own.normals, occluders, gap)
-                distance = np.linalg.norm(vector, axis=1)
+                distance = lengths(vector)
                 direction = vector / np.maximum(distance, 1e-30)[:, None]
                 hidden |= occluders.occluded(middle.astype(np.float32), direction, distance)
         done.append((corners[~hidden], albedo[~hidden], source[~hidden]))
@@ -254,7 +255,7 @@ def cut_at_walls(surfaces: Fragments, occluders: EmbreeTriangles, gap: float) ->
 
 def halves(corners: Float32[ndarray, "T 3 3"]) -> Float32[ndarray, "U 3 3"]:
     """Every triangle cut through the middle of its longest edge; the halves of one follow each other."""
-    edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    edges = lengths(np.roll(corners, -1, axis=1) - corners)
     turn = (edges.argmax(axis=1)[:, None] + np.arange(3)) % 3
     first, second, third = np.moveaxis(np.take_along_axis(corners, turn[:, :, None], axis=1), 1, 0)
     middle = (first + second) / 2
