@@ -43,7 +43,7 @@ FAST := not blender and not engines and not packaging and not slow
 test: export PYTHONDONTWRITEBYTECODE =
 test: setup-test
 	SRBF_CHECK_ANNOTATIONS=1 $(BIN)/pytest -m "$(FAST)" -n 2 --dist worksteal
-	$(BIN)/pytest -m "not ($(FAST))" -n 4 --dist loadfile --no-loadscope-reorder
+	$(BIN)/pytest -m "not ($(FAST))" -n 3 --dist loadfile --no-loadscope-reorder
 
 test-fast: setup-test
 	$(BIN)/pytest -m "$(FAST) and not lengthy" -n 2 --dist worksteal
