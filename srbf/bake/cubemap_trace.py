@@ -220,7 +220,7 @@ class _Stages:
             seen = np.unpackbits(bits, axis=1, count=len(missing))
             direct = seen * np.maximum(tracer.normals @ tracer.directions.T, 0)
             lit = light_on_surfels(self.surfels, directions[missing], self.occluders)[0]
-            weights = channel_products(bounces["from_surfels"].astype(np.float32), np.repeat(lit[:, :, None], 3, axis=2))
+            weights = channel_products(bounces["from_surfels"].astype(np.float32), np.broadcast_to(lit[:, :, None], (*lit.shape, 3)))
             shapes = bounces["shapes"].astype(np.float32)
             if unknown:
                 write_arrays(self.capture.folder / TESTED_FILE, self.key, bits=bits, weights=weights.transpose(1, 0, 2))

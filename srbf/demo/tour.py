@@ -185,7 +185,7 @@ class _Tour:
         """Whatever fails in here, the other scenes can still be made."""
         try:
             yield
-        except Exception as error:  # noqa: BLE001
+        except Exception as error:  # noqa: BLE001  whatever it is, one line says so on the page
             card.note, card.failed, card.is_done = f"{stop.name} failed: {_in_one_line(error)}", True, True
             self._reporter.say(card.note)
 

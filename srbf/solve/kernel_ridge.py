@@ -32,8 +32,11 @@ class KernelPath:
 
     @staticmethod
     def of_columns(columns: Float64[ndarray, "L K"]) -> KernelPath:
-        """Of the kernel A A^T: all products take K / L of the time where A has fewer columns than rows."""
-        if columns.shape[1] >= len(columns):
+        """Of the kernel A A^T: all products take K / L of the time where A has no more than half as many columns as rows.
+
+        With more, what is across the vectors is the small difference of large numbers.
+        """
+        if 2 * columns.shape[1] > len(columns):
             return KernelPath.of(columns @ columns.T)
         vectors, singular, _ = np.linalg.svd(columns, full_matrices=False)
         return KernelPath(singular**2, vectors)

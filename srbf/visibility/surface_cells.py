@@ -19,7 +19,7 @@ from srbf.visibility.embree import EmbreeTriangles
 
 OFFSET = 1e-4  # of the scene's size: between a surface and the end of a ray to it
 STAGES = (16, 192)  # places that most surfaces are seen from
-RAYS = 1 << 20  # traced at a time
+RAYS = 1 << 18  # that each core traces at a time
 MOST_RAYS, FEWEST_PLACES = 1 << 26, 48  # of points to places, in a stage, where the points are more than that many each
 LAYERS = 1 / 8  # of a cell's size: walls that are farther apart are not in one cell
 NORMAL_BINS = 2  # per axis and sign: a cell's fragments face about the same way

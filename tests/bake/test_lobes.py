@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bpy_process import in_blender
+from test_glossy_bakes import receiver_of
 
 pytestmark = pytest.mark.blender
 
@@ -60,3 +61,32 @@ def test_muted_nodes_and_links_are_left_out_as_cycles_leaves_them_out() -> None:
     np.testing.assert_allclose(found["mix"], PLASTIC, rtol=1e-6)
     np.testing.assert_allclose(found["share"], METAL, rtol=1e-6)
     np.testing.assert_array_equal(found["metal"], 0)
+
+
+def lobe_of_large_values() -> dict[str, Any]:
+    """The lobe of a plane of that mix whose factor, metallic and roughness are fed by numbers above 1."""
+    import bpy
+
+    from blender_bake import scene as scenes
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scenes.configure(bpy.context.scene)
+    bpy.ops.mesh.primitive_plane_add(size=2)
+    material = bpy.data.materials.new("Mixed")
+    material.use_nodes = True
+    bpy.context.object.data.materials.append(material)
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    plastic, metal, mix = nodes["Principled BSDF"], nodes.new("ShaderNodeBsdfPrincipled"), nodes.new("ShaderNodeMixShader")
+    number = nodes.new("ShaderNodeValue")
+    number.outputs[0].default_value = 1.7
+    for socket in (mix.inputs[0], metal.inputs["Metallic"], metal.inputs["Roughness"]):
+        links.new(number.outputs[0], socket)
+    links.new(plastic.outputs[0], mix.inputs[1])
+    links.new(metal.outputs[0], mix.inputs[2])
+    links.new(mix.outputs[0], nodes["Material Output"].inputs["Surface"])
+    return receiver_of(bpy.context.scene, "Plane", []).channels(["lobe"])
+
+
+def test_numbers_above_1_are_cut_off_as_cycles_cuts_them_off() -> None:
+    lobe = in_blender(lobe_of_large_values)["lobe"].reshape(-1, 3)[:4]
+    np.testing.assert_allclose(lobe, 1, atol=1e-3)  # roughness, share with a Fresnel term, whether there is any: metal alone
