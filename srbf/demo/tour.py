@@ -21,7 +21,7 @@ from srbf.viewer.contents import contents_of
 from srbf.viewer.single_file import single_file
 
 INDEX = "index.html"
-KEPT = "card.json"  # of a finished scene
+KEPT = "card.json"  # of a scene that is begun
 UNFINISHED = "Not finished: the same command resumes it."
 
 
@@ -112,7 +112,7 @@ class _Tour:
         self._is_said = False
 
     def check_quality(self) -> None:
-        """InputError where a finished scene has another quality."""
+        """InputError where a scene was begun with another quality."""
         for stop in STOPS:
             found = self._found(stop) or {}
             quality = found.get("quality", self._quality)
@@ -146,6 +146,8 @@ class _Tour:
             return
         card.note = "Being made now."
         self.write()
+        files.make_folder(self._folder / stop.name)
+        files.write_json(self._folder / stop.name / KEPT, self._record(card))
 
         def say(told: str) -> None:
             self._reporter.say(f"{stop.name}: {told}")
@@ -196,12 +198,12 @@ class _Tour:
             return None
         with suppress(KeyError, TypeError):
             card = Card(**found["card"])
-            if found == self._record(card):
+            if card.is_done and found == self._record(card):
                 return replace(card, title=stop.title, sentence=stop.sentence, opens=stop.opens)
         return None
 
     def _found(self, stop: Stop) -> dict[str, Any] | None:
-        """What a finished scene recorded."""
+        """What a scene recorded, when it was begun or once it was finished."""
         with suppress(SrbfError):
             return files.read_json(self._folder / stop.name / KEPT)
         return None

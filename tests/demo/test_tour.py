@@ -120,6 +120,11 @@ def test_an_interrupted_tour_says_so(scenes: Callable[..., Made], tmp_path: Path
     index = (tmp_path / "index.html").read_text()
     assert 'http-equiv="refresh"' not in index and links(index) == ["loft.html"]
     assert index.count("Not finished: the same command resumes it.") == 3 and "Being made now." not in index
+    done = CliRunner().invoke(app, ["demo", "-o", str(tmp_path), "--quality", "publish"])
+    assert done.exit_code == 1 and "expected quality draft, that of the scenes in" in " ".join(done.output.split())
+    assert (tmp_path / "index.html").read_text() == index, "what is there of another quality is not touched"
+    again = scenes()
+    assert tour.run_tour(tmp_path, Reporter(), lambda *_: None) == [] and again.made == ["loft", "caustics", "coin"]
 
 
 def test_a_card_names_what_its_page_opens_with() -> None:
